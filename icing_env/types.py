@@ -1,0 +1,189 @@
+"""The nouns: every record that passes between the parts, as NumPy structured types with one row per aircraft.
+
+Each field is written once, with its unit and meaning. SI and radians throughout; body axes x forward, y right,
+z down; local frame north, east, down. Names of measured channels are the column names of a flight record.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+Field = tuple[str, str, str]  # name, unit, meaning
+
+# What the Runge-Kutta step integrates. First in STATE, in this order.
+CONTINUOUS_FIELDS: list[Field] = [
+    ("north", "m", "position north of the start"),
+    ("east", "m", "position east of the start"),
+    ("altitude", "m", "geometric altitude above sea level"),
+    ("u", "m/s", "inertial velocity, body x"),
+    ("v", "m/s", "inertial velocity, body y"),
+    ("w", "m/s", "inertial velocity, body z"),
+    ("e0", "1", "attitude quaternion (body from local), scalar part"),
+    ("e1", "1", "attitude quaternion, x"),
+    ("e2", "1", "attitude quaternion, y"),
+    ("e3", "1", "attitude quaternion, z"),
+    ("p", "rad/s", "roll rate"),
+    ("q", "rad/s", "pitch rate"),
+    ("r", "rad/s", "yaw rate"),
+    ("elevator", "rad", "surface position, positive trailing edge down (pitches down)"),
+    ("aileron", "rad", "surface position, positive rolls left"),
+    ("rudder", "rad", "surface position, positive yaws left"),
+    ("flap", "rad", "flap position"),
+    ("power_left", "W", "shaft power of the left engine"),
+    ("power_right", "W", "shaft power of the right engine"),
+    ("alpha_downwash", "rad", "angle of attack whose downwash reaches the tail now"),
+]
+
+GUST_FIELDS: list[Field] = [
+    ("gust_u", "m/s", "turbulence and discrete gust, air velocity along body x, held over a step"),
+    ("gust_v", "m/s", "the same along body y"),
+    ("gust_w", "m/s", "the same along body z"),
+    ("gust_p", "rad/s", "rotation of the air about body x"),
+    ("gust_q", "rad/s", "rotation of the air about body y"),
+    ("gust_r", "rad/s", "rotation of the air about body z"),
+    ("gust_w_tail", "m/s", "vertical gust that the tail meets now"),
+    ("dryden_u", "m/s", "state of the Dryden filter of u"),
+    ("dryden_v1", "m/s", "first state of the Dryden filter of v"),
+    ("dryden_v2", "m/s", "second state of the Dryden filter of v"),
+    ("dryden_w1", "m/s", "first state of the Dryden filter of w"),
+    ("dryden_w2", "m/s", "second state of the Dryden filter of w"),
+    ("dryden_p", "rad/s", "state of the Dryden filter of p"),
+    ("dryden_q", "m/s", "state of the Dryden filter of q"),
+    ("dryden_r", "m/s", "state of the Dryden filter of r"),
+]
+
+CLOUD_FIELDS: list[Field] = [
+    ("lwc", "kg/m3", "liquid water content met now"),
+    ("mvd", "m", "median volume diameter of the drops"),
+    ("temperature", "K", "static air temperature at the aircraft"),
+    ("cloud_left", "m", "distance to the end of this cloud (positive) or of this gap (negative)"),
+    ("cloud_lwc_mean", "kg/m3", "mean liquid water content of this cloud"),
+    ("cloud_lwc_noise", "1", "slow relative fluctuation of the liquid water content"),
+]
+
+# Surfaces on which ice is counted; each has the fields of ICE_FIELDS with the surface's name appended.
+SURFACES = ("left_wing", "right_wing", "htail", "vtail", "struts", "propeller", "other")
+ICE_FIELDS: list[Field] = [
+    (f"{quantity}_{surface}", unit, f"{meaning}, {surface.replace('_', ' ')}")
+    for quantity, unit, meaning in (
+        ("eta", "1", "icing severity"),
+        ("thickness", "m", "ice thickness at the stagnation line"),
+        ("ice_mass", "kg", "mass of ice"),
+    )
+    for surface in SURFACES
+]
+PROTECTION_FIELDS: list[Field] = [
+    ("boot_age_wing", "s", "time since the wing boots last inflated"),
+    ("boot_age_tail", "s", "time since the horizontal-tail boots last inflated"),
+    ("boot_age_vtail_struts", "s", "time since the fin and strut boots last inflated"),
+    ("boot_was_wing", "0/1", "wing boot command a step ago, to find its rising edge"),
+    ("boot_was_tail", "0/1", "tail boot command a step ago"),
+    ("boot_was_vtail_struts", "0/1", "fin and strut boot command a step ago"),
+    ("boot_cycles", "1", "inflations so far, all boots"),
+    ("heat_energy", "J", "electric energy spent on propeller heat so far"),
+]
+
+INSTRUMENT_FIELDS: list[Field] = [
+    ("pitot", "m/s", "airspeed behind the pitot lag and the anti-boom filter"),
+    ("vane_alpha", "rad", "angle of attack behind the vane lag"),
+    ("vane_beta", "rad", "sideslip behind the vane lag"),
+    ("boom_position", "rad", "deflection of the nose boom as an angle"),
+    ("boom_rate", "rad/s", "its rate"),
+    *((f"filtered_{c}", u, f"{c} behind the anti-boom low pass") for c, u in (
+        ("alpha", "rad"), ("beta", "rad"), ("p", "rad/s"), ("q", "rad/s"), ("r", "rad/s"),
+        ("ax", "m/s2"), ("ay", "m/s2"), ("az", "m/s2"))),
+]
+
+STATE_FIELDS = CONTINUOUS_FIELDS + GUST_FIELDS + CLOUD_FIELDS + ICE_FIELDS + PROTECTION_FIELDS + INSTRUMENT_FIELDS
+
+# What is asked of the aircraft: surfaces, power, ice protection.
+COMMAND_FIELDS: list[Field] = [
+    ("elevator", "rad", "commanded elevator"),
+    ("aileron", "rad", "commanded aileron"),
+    ("rudder", "rad", "commanded rudder"),
+    ("flap", "rad", "commanded flap"),
+    ("throttle_left", "0..1", "power lever, left"),
+    ("throttle_right", "0..1", "power lever, right"),
+    ("boots_wing", "0/1", "wing boots: a rising edge is one shot, held on it cycles"),
+    ("boots_tail", "0/1", "horizontal-tail boots"),
+    ("boots_vtail_struts", "0/1", "fin and strut boots"),
+    ("prop_heat", "0/1", "electric propeller heat"),
+]
+
+# What the instruments read. Slow channels (marked 1 Hz) keep their value between samples.
+MEASUREMENT_FIELDS: list[Field] = [
+    ("time", "s", "time since reset"),
+    ("airspeed", "m/s", "true airspeed"),
+    ("alpha", "rad", "angle of attack at the c.g."),
+    ("beta", "rad", "sideslip at the c.g."),
+    ("p", "rad/s", "roll rate"),
+    ("q", "rad/s", "pitch rate"),
+    ("r", "rad/s", "yaw rate"),
+    ("phi", "rad", "bank angle"),
+    ("theta", "rad", "pitch angle"),
+    ("psi", "rad", "heading, continuous"),
+    ("ax", "m/s2", "specific force along x at the c.g."),
+    ("ay", "m/s2", "specific force along y at the c.g."),
+    ("az", "m/s2", "specific force along z at the c.g."),
+    ("elevator", "rad", "measured position"),
+    ("aileron", "rad", "measured position"),
+    ("rudder", "rad", "measured position"),
+    ("flap", "rad", "measured position"),
+    ("throttle_left", "0..1", "power lever"),
+    ("throttle_right", "0..1", "power lever"),
+    ("thrust_left", "N", "thrust from torque, speed of rotation and the propeller chart"),
+    ("thrust_right", "N", "the same on the right"),
+    ("torque_left", "N m", "shaft torque"),
+    ("torque_right", "N m", "shaft torque"),
+    ("rpm_left", "1/min", "propeller speed"),
+    ("rpm_right", "1/min", "propeller speed"),
+    ("altitude", "m", "pressure altitude"),
+    ("temperature", "K", "static temperature (1 Hz)"),
+    ("pressure", "Pa", "static pressure"),
+    ("lwc", "kg/m3", "liquid water content (1 Hz)"),
+    ("mvd", "m", "median volume diameter (1 Hz)"),
+    ("ground_speed", "m/s", "speed over ground"),
+    ("track", "rad", "track over ground"),
+    ("hinge_moment_elevator", "N m", "elevator hinge moment"),
+    ("hinge_moment_aileron", "N m", "aileron hinge moment"),
+]
+
+# Aerodynamic coefficients as the aircraft is now (ice included): the truth that estimators are scored against.
+DERIVATIVE_NAMES = (
+    "CX_0", "CX_alpha", "CX_alpha2", "CZ_0", "CZ_alpha", "CZ_q", "CZ_elevator",
+    "Cm_0", "Cm_alpha", "Cm_q", "Cm_elevator",
+    "CY_beta", "CY_p", "CY_r", "CY_rudder",
+    "Cl_beta", "Cl_p", "Cl_r", "Cl_aileron", "Cl_rudder",
+    "Cn_beta", "Cn_p", "Cn_r", "Cn_aileron", "Cn_rudder",
+)  # fmt: skip
+CURRENT_FIELDS: list[Field] = [
+    *((name, "1" if name.endswith("_0") else "1/rad", "value now, ice included") for name in DERIVATIVE_NAMES),
+    ("CZ_alpha_left", "1/rad", "lift-curve slope of the left half wing"),
+    ("CZ_alpha_right", "1/rad", "lift-curve slope of the right half wing"),
+    ("CX_0_left", "1", "axial coefficient of the left half wing"),
+    ("CX_0_right", "1", "axial coefficient of the right half wing"),
+    ("CD_parasite", "1", "drag along the air stream of struts, gear and other bluff parts"),
+    ("alpha_stall_left", "rad", "onset of separation on the left half wing"),
+    ("alpha_stall_right", "rad", "onset of separation on the right half wing"),
+    ("alpha_tail_stall", "rad", "tail angle (negative lift) at which the tailplane separates"),
+    ("mass", "kg", "mass, ice included"),
+    ("efficiency", "1", "propeller efficiency factor, ice included"),
+]
+
+
+def structured(fields: list[Field], *extra: tuple[str, str]) -> np.dtype:
+    """Structured type of float64 fields, followed by `extra` (name, numpy type) pairs."""
+    return np.dtype([(name, "f8") for name, _, _ in fields] + list(extra))
+
+
+CONTINUOUS = structured(CONTINUOUS_FIELDS)
+STATE = structured(STATE_FIELDS, ("step", "i8"), ("seed", "u8"))
+COMMAND = structured(COMMAND_FIELDS)
+MEASUREMENT = structured(MEASUREMENT_FIELDS)
+CURRENT = structured(CURRENT_FIELDS)
+N_CONTINUOUS = len(CONTINUOUS_FIELDS)
+
+
+def units(fields: list[Field]) -> dict[str, str]:
+    """Unit of each field by name."""
+    return {name: unit for name, unit, _ in fields}
