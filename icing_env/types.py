@@ -187,3 +187,38 @@ N_CONTINUOUS = len(CONTINUOUS_FIELDS)
 def units(fields: list[Field]) -> dict[str, str]:
     """Unit of each field by name."""
     return {name: unit for name, unit, _ in fields}
+
+# What an observer believes, from measurements only; the interface between observer and ice management.
+ESTIMATED_NAMES = (
+    "CD_0", "CL_0", "CL_alpha", "CL_elevator",
+    "Cm_0", "Cm_alpha", "Cm_q", "Cm_elevator",
+    "CY_0", "CY_beta", "CY_r", "CY_rudder",
+    "Cl_0", "Cl_beta", "Cl_p", "Cl_r", "Cl_aileron", "Cl_rudder",
+    "Cn_0", "Cn_beta", "Cn_p", "Cn_r", "Cn_aileron", "Cn_rudder",
+)  # fmt: skip
+ESTIMATE_FIELDS: list[Field] = [
+    *((name, "1" if name.endswith("_0") else "1/rad", "estimate") for name in ESTIMATED_NAMES),
+    *((f"{name}_std", "1" if name.endswith("_0") else "1/rad", "its standard error") for name in ESTIMATED_NAMES),
+    ("excess_drag", "1", "CD_0 above that of the clean aircraft, smoothed for decisions"),
+    ("excitation_longitudinal", "1", "share of recent pitch activity that the elevator caused, 0..1"),
+    ("excitation_lateral", "1", "share of recent roll and yaw activity that aileron and rudder caused, 0..1"),
+    ("health", "0/1", "1 while the observer's matrices are positive definite and finite"),
+]
+
+# What the ice management says to the crew, to the protection system and to whatever controller flies.
+ADVISORY_FIELDS: list[Field] = [
+    ("severity", "1", "estimated icing severity, 0 clean, 1 severe"),
+    ("confidence", "0..1", "confidence in the severity"),
+    ("ice_detected", "0/1", "ice is believed to be on the aircraft"),
+    ("boots_wing", "0/1", "wing boots asked for"),
+    ("boots_tail", "0/1", "horizontal-tail boots asked for"),
+    ("boots_vtail_struts", "0/1", "fin and strut boots asked for"),
+    ("prop_heat", "0/1", "propeller heat asked for"),
+    ("alpha_limit", "rad", "highest angle of attack allowed now"),
+    ("airspeed_limit", "m/s", "lowest true airspeed allowed now"),
+    ("bank_limit", "rad", "largest bank allowed now"),
+    ("flap_limit", "rad", "largest flap allowed now"),
+    ("intervention", "rad", "size of the change the protection made to the elevator in this step"),
+]
+ESTIMATE = structured(ESTIMATE_FIELDS)
+ADVISORY = structured(ADVISORY_FIELDS, ("memory", "f8"), ("since_detection", "f8"))
