@@ -91,7 +91,8 @@ INSTRUMENT_FIELDS: list[Field] = [
     ("boom_rate", "rad/s", "its rate"),
     *((f"filtered_{c}", u, f"{c} behind the anti-boom low pass") for c, u in (
         ("alpha", "rad"), ("beta", "rad"), ("p", "rad/s"), ("q", "rad/s"), ("r", "rad/s"),
-        ("ax", "m/s2"), ("ay", "m/s2"), ("az", "m/s2"))),
+        ("ax", "m/s2"), ("ay", "m/s2"), ("az", "m/s2"),
+        ("elevator", "rad"), ("aileron", "rad"), ("rudder", "rad"))),
 ]
 
 STATE_FIELDS = CONTINUOUS_FIELDS + GUST_FIELDS + CLOUD_FIELDS + ICE_FIELDS + PROTECTION_FIELDS + INSTRUMENT_FIELDS

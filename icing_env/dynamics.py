@@ -1,0 +1,144 @@
+"""The aircraft as one chain of equations: air data, coefficients, forces, and the rates of the continuous state.
+
+Flat Earth, rigid body, 3-2-1 quaternion attitude. Stevens, Lewis & Johnson, Aircraft Control and Simulation, 3rd ed.,
+eqs. 1.7-18 (translation, rotation with Ixz, kinematics); all in body axes about the c.g.
+
+Records: `x` the continuous state, `s` the state with what is held over a step (gusts), `c` the coefficients as they
+are now (ice included), `p` the parameters, `u` the command.
+"""
+
+from __future__ import annotations
+
+import math
+
+from icing_env.actuators import aileron_hinge_moment, elevator_hinge_moment, floated, surface_rate
+from icing_env.aerodynamics import CT_MAX, lateral, longitudinal, separation, smootherstep, tail_angle
+from icing_env.atmosphere import GAS_CONSTANT, gravity, pressure, temperature
+from icing_env.frames import to_body, to_local
+from icing_env.jit import kernel
+from icing_env.propulsion import power_wanted, thrust_per_power
+from icing_env.wind import wind
+
+FLAP_LAG = 0.2  # s, rounds the corner where the flap arrives (assumed)
+AIRSPEED_FLOOR = 0.1524  # m/s (0.5 ft/s), floor of the normalised rates (NASA/TM-2015-218675, case 3)
+
+
+@kernel
+def air_data(x, s, p) -> tuple:
+    """Airspeed [m/s], alpha, beta [rad], sine of alpha, and axial airspeed, from inertial velocity, wind and gust."""
+    north, east, down = wind(x.altitude, p)
+    wx, wy, wz = to_body(x.e0, x.e1, x.e2, x.e3, north, east, down)
+    ua, va, wa = x.u - wx - s.gust_u, x.v - wy - s.gust_v, x.w - wz - s.gust_w
+    plane = math.sqrt(ua*ua + wa*wa)
+    airspeed = math.sqrt(plane*plane + va*va)
+    sine = wa/max(plane, 1e-9)
+    # asin is exact to rounding below 45 deg and three times faster than atan2
+    alpha = math.asin(sine) if abs(wa) < ua else math.atan2(wa, ua)
+    beta = math.asin(va/max(airspeed, 1e-9)) if airspeed > 1e-9 else 0.0
+    return airspeed, alpha, beta, sine, ua, va, wa
+
+
+@kernel
+def forces(x, s, c, p) -> tuple:
+    """Aerodynamic and propulsive force [N] and moment about the c.g. [N m], and what instruments and controls need.
+
+    Returns: Fx, Fy, Fz, L, M, N, airspeed, alpha, beta, density, thrust left, thrust right, elevator and aileron hinge
+    moments, static pressure.
+    """
+    static = pressure(x.altitude)
+    density = p.density_factor*static/(GAS_CONSTANT*(temperature(x.altitude) + p.temperature_offset))
+    airspeed, alpha, beta, sine, ua, va, wa = air_data(x, s, p)
+    speed = max(airspeed, AIRSPEED_FLOOR)
+    qbar = 0.5*density*airspeed*airspeed
+    half = 0.5/speed
+    pa, qa, ra = x.p - s.gust_p, x.q - s.gust_q, x.r - s.gust_r
+    phat, qhat, rhat = pa*p.span*half, qa*p.chord*half, ra*p.span*half
+
+    per_power = thrust_per_power(ua, c, p)
+    thrust_left = p.thrust_factor_left*x.power_left*per_power
+    thrust_right = p.thrust_factor_right*x.power_right*per_power
+    thrust = thrust_left + thrust_right
+    qs = qbar*p.wing_area
+    ct = min(thrust/max(qs, 1e-9), CT_MAX) - p.CT_reference
+
+    wingtip = phat*p.panel_arm
+    flap_shift = p.alpha_stall_flap*x.flap
+    left = separation(alpha - wingtip, c.alpha_stall_left + flap_shift, p)
+    right = separation(alpha + wingtip, c.alpha_stall_right + flap_shift, p)
+    alpha_tail = tail_angle(alpha, x.alpha_downwash, qa, speed, x, s, p)
+    tail = smootherstep((-alpha_tail - c.alpha_tail_stall)/p.tail_stall_width)
+    height = 16.0*(x.altitude - p.ground_altitude)/p.span
+    low = 1.0/(1.0 + height*height)
+
+    axial_left, axial_right, lift_left, lift_right, rest_x, rest_z, cm = longitudinal(
+        alpha, sine, qhat, left, right, tail, ct, low, speed, x, s, c, p)
+    cy, cl, cn = lateral(alpha, beta, phat, rhat, 0.5*(left + right), x, c, p)
+    # a stalled tailplane keeps only the download it had at the onset
+    cm -= tail*p.Cm_alpha_tail*(alpha_tail + c.alpha_tail_stall)
+    cl += 0.5*p.lift_arm*(lift_right - lift_left)
+    cn -= 0.5*p.lift_arm*(axial_right - axial_left)
+
+    bluff = qs*c.CD_parasite/max(airspeed, 1e-9)
+    fx = qs*(0.5*(axial_left + axial_right) + rest_x) - bluff*ua + thrust
+    fy = qs*cy - bluff*va
+    fz = qs*(0.5*(lift_left + lift_right) + rest_z) - bluff*wa
+    roll = qs*p.span*cl - p.cg_shift_y*fz + p.cg_shift_z*fy
+    pitch = qs*p.chord*cm - p.cg_shift_z*fx + p.cg_shift_x*fz + p.engine_arm_z*thrust
+    yaw = qs*p.span*cn - p.cg_shift_x*fy + p.cg_shift_y*fx + p.engine_arm_y*(thrust_left - thrust_right)
+    hinge_e = elevator_hinge_moment(qbar, alpha_tail, tail, x, p)
+    hinge_a = aileron_hinge_moment(qbar, left, right, x, p)
+    return (fx, fy, fz, roll, pitch, yaw, airspeed, alpha, beta, density, thrust_left, thrust_right,
+            hinge_e, hinge_a, static)
+
+
+@kernel
+def rigid_body(x, dx, fx, fy, fz, roll, pitch, yaw, c, p) -> None:
+    """Newton and Euler: rates of velocity, attitude, rotation and position from force [N] and moment [N m]."""
+    g = gravity(x.altitude, p.gravity_sea_level, p.earth_radius)
+    gx, gy, gz = to_body(x.e0, x.e1, x.e2, x.e3, 0.0, 0.0, g)
+    dx.u = x.r*x.v - x.q*x.w + gx + fx/c.mass
+    dx.v = x.p*x.w - x.r*x.u + gy + fy/c.mass
+    dx.w = x.q*x.u - x.p*x.v + gz + fz/c.mass
+    dx.e0 = -0.5*(x.e1*x.p + x.e2*x.q + x.e3*x.r)
+    dx.e1 = 0.5*(x.e0*x.p + x.e2*x.r - x.e3*x.q)
+    dx.e2 = 0.5*(x.e0*x.q + x.e3*x.p - x.e1*x.r)
+    dx.e3 = 0.5*(x.e0*x.r + x.e1*x.q - x.e2*x.p)
+    ixx, iyy, izz, ixz = p.inertia_xx, p.inertia_yy, p.inertia_zz, p.inertia_xz
+    rolling = roll + ixz*x.p*x.q + (iyy - izz)*x.q*x.r
+    yawing = yaw - ixz*x.q*x.r + (ixx - iyy)*x.p*x.q
+    determinant = ixx*izz - ixz*ixz
+    dx.p = (izz*rolling + ixz*yawing)/determinant
+    dx.q = (pitch + (izz - ixx)*x.p*x.r - ixz*(x.p*x.p - x.r*x.r))/iyy
+    dx.r = (ixx*yawing + ixz*rolling)/determinant
+    north, east, down = to_local(x.e0, x.e1, x.e2, x.e3, x.u, x.v, x.w)
+    dx.north, dx.east, dx.altitude = north, east, -down
+
+
+@kernel
+def controls_and_engines(x, dx, u, hinge_e, hinge_a, static, p) -> None:
+    """Rates of the surfaces, the flap and the shaft powers."""
+    dx.elevator = surface_rate(
+        x.elevator,
+        p.elevator_gearing*u.elevator + p.elevator_offset
+        + floated(hinge_e, p.hinge_elevator_hold, p.hinge_elevator_stiffness),
+        p.elevator_min, p.elevator_max, p.elevator_lag, p.elevator_rate)
+    dx.aileron = surface_rate(
+        x.aileron,
+        p.aileron_gearing*u.aileron + p.aileron_offset
+        + floated(hinge_a, p.hinge_aileron_hold, p.hinge_aileron_stiffness),
+        p.aileron_min, p.aileron_max, p.aileron_lag, p.aileron_rate)
+    dx.rudder = surface_rate(x.rudder, p.rudder_gearing*u.rudder + p.rudder_offset,
+                             p.rudder_min, p.rudder_max, p.rudder_lag, p.rudder_rate)
+    dx.flap = surface_rate(x.flap, u.flap, 0.0, p.flap_max, FLAP_LAG, p.flap_rate)
+    dx.power_left = (power_wanted(u.throttle_left, static, p) - x.power_left)/p.spool_time
+    dx.power_right = (power_wanted(u.throttle_right, static, p) - x.power_right)/p.spool_time
+
+
+@kernel
+def derivative(x, dx, s, c, p, u) -> None:
+    """Rates of the whole continuous state, written into `dx`."""
+    (fx, fy, fz, roll, pitch, yaw, airspeed, alpha, _beta, _density, _left, _right,
+     hinge_e, hinge_a, static) = forces(x, s, c, p)
+    rigid_body(x, dx, fx, fy, fz, roll, pitch, yaw, c, p)
+    controls_and_engines(x, dx, u, hinge_e, hinge_a, static, p)
+    dx.alpha_downwash = (alpha - x.alpha_downwash)*max(airspeed, AIRSPEED_FLOOR)/p.tail_arm

@@ -1,0 +1,167 @@
+"""What the instruments of NASA's icing research aircraft read: lag, boom oscillation, filter, scale, bias, noise.
+
+Instruments: true airspeed, flow vanes on a nose boom, three rate gyros, vertical and directional gyro, three
+accelerometers, surface positions, torque and speed of the propellers, static pressure and temperature, GPS, liquid
+water and drop size, hinge moments (founding paper, section on the research aircraft; Melody 2004 for the hinge
+moments). The boom oscillates at 7 Hz and a 10 Hz low pass is applied in flight (the paper): here a first-order one on
+every fast channel alike, controls included, so that filtering shifts none against another. Flow angles and
+accelerations are corrected to the c.g., as in the records.
+
+measured = (1 + scale) x (truth behind lag, boom and filter) + bias + noise
+"""
+
+from __future__ import annotations
+
+import math
+
+from icing_env.atmosphere import pressure_altitude
+from icing_env.dynamics import forces
+from icing_env.frames import euler_angles, to_local
+from icing_env.jit import kernel
+from icing_env.propulsion import torque
+from icing_env.random import normal4
+from icing_env.types import Field
+
+NOISY = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "psi", "ax", "ay", "az", "elevator", "aileron",
+         "rudder", "thrust", "pressure", "temperature", "lwc", "mvd", "hinge_moment")  # fmt: skip
+BIASED = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "ax", "ay", "az", "elevator", "aileron", "rudder",
+          "pressure", "temperature")  # fmt: skip
+SCALED = ("airspeed", "alpha", "beta", "p", "q", "r", "ax", "ay", "az", "thrust")
+
+SENSOR_PARAMETERS: list[Field] = [
+    *((f"noise_{c}", "of the channel", "standard deviation of the noise") for c in NOISY),
+    *((f"bias_{c}", "of the channel", "constant error") for c in BIASED),
+    *((f"scale_{c}", "1", "relative error") for c in SCALED),
+    ("pitot_lag", "s", "time constant of the airspeed"),
+    ("pitot_alpha", "1/rad", "position error: relative airspeed error per angle of attack"),
+    ("vane_lag", "s", "time constant of the flow vanes"),
+    ("vane_position_error", "m", "error of the boom length used in the correction to the c.g."),
+    ("boom_frequency", "Hz", "natural frequency of the nose boom"),
+    ("boom_damping", "1", "its damping ratio"),
+    ("boom_gain", "rad s2/m", "flow-angle error per normal acceleration"),
+    ("filter_frequency", "Hz", "cut-off of the anti-boom low pass"),
+]
+SENSOR_STREAM = 3  # random stream of the instruments
+
+
+@kernel
+def lag_gain(dt: float, time_constant: float) -> float:
+    """Share of the way a first-order lag goes in `dt`; exactly 1 without lag."""
+    return 1.0 - math.exp(-dt/time_constant) if time_constant > 0.0 else 1.0
+
+
+@kernel
+def advance_boom(s, p, drive: float, dt: float) -> None:
+    """Nose boom as a damped oscillator under a normal acceleration [m/s2] held over the step, solved exactly."""
+    omega = 2.0*math.pi*p.boom_frequency
+    damped = omega*math.sqrt(1.0 - p.boom_damping*p.boom_damping)
+    rest = p.boom_gain*drive
+    decay = math.exp(-p.boom_damping*omega*dt)
+    cosine, sine = math.cos(damped*dt), math.sin(damped*dt)
+    away, rate = s.boom_position - rest, s.boom_rate
+    s.boom_position = rest + decay*(away*cosine + (rate + p.boom_damping*omega*away)/damped*sine)
+    s.boom_rate = decay*(rate*cosine - (p.boom_damping*omega*rate + omega*omega*away)/damped*sine)
+
+
+@kernel
+def start_instruments(x, s, c, p) -> None:
+    """Settle every lag and filter on the present flight condition."""
+    fx, fy, fz, _l, _m, _n, airspeed, alpha, beta, _rho, _tl, _tr, _he, _ha, _ps = forces(x, s, c, p)
+    s.pitot, s.vane_alpha, s.vane_beta = airspeed, alpha, beta
+    s.boom_position, s.boom_rate = 0.0, 0.0
+    s.filtered_alpha, s.filtered_beta = alpha, beta
+    s.filtered_p, s.filtered_q, s.filtered_r = x.p, x.q, x.r
+    s.filtered_ax, s.filtered_ay, s.filtered_az = fx/c.mass, fy/c.mass, fz/c.mass
+    s.filtered_elevator, s.filtered_aileron, s.filtered_rudder = x.elevator, x.aileron, x.rudder
+
+
+@kernel
+def filter_flow_and_inertial(x, s, c, p, airspeed, alpha, beta, fx, fy, fz, dt: float) -> None:
+    """Lags of pitot and vanes, the boom, then the same low pass on every fast channel."""
+    cut = 1.0 - math.exp(-2.0*math.pi*p.filter_frequency*dt)
+    vane = lag_gain(dt, p.vane_lag)
+    speed = max(airspeed, 1.0)
+    s.vane_alpha += vane*(alpha + p.vane_position_error*x.q/speed - s.vane_alpha)
+    s.vane_beta += vane*(beta - p.vane_position_error*x.r/speed - s.vane_beta)
+    if p.boom_gain != 0.0:
+        advance_boom(s, p, fz/c.mass + p.gravity_sea_level, dt)
+    s.pitot += lag_gain(dt, p.pitot_lag)*(airspeed*(1.0 + p.pitot_alpha*alpha) - s.pitot)
+    s.filtered_alpha += cut*(s.vane_alpha + s.boom_position - s.filtered_alpha)
+    s.filtered_beta += cut*(s.vane_beta - s.filtered_beta)
+    s.filtered_p += cut*(x.p - s.filtered_p)
+    s.filtered_q += cut*(x.q - s.filtered_q)
+    s.filtered_r += cut*(x.r - s.filtered_r)
+    s.filtered_ax += cut*(fx/c.mass - s.filtered_ax)
+    s.filtered_ay += cut*(fy/c.mass - s.filtered_ay)
+    s.filtered_az += cut*(fz/c.mass - s.filtered_az)
+    s.filtered_elevator += cut*(x.elevator - s.filtered_elevator)
+    s.filtered_aileron += cut*(x.aileron - s.filtered_aileron)
+    s.filtered_rudder += cut*(x.rudder - s.filtered_rudder)
+
+
+@kernel
+def read_fast(s, m, p) -> None:
+    """Flow, inertial and surface channels: scale, bias and noise (blocks 0 to 3 of the instrument stream)."""
+    n0, n1, n2, n3 = normal4(s.seed, SENSOR_STREAM, s.step, 0)
+    m.airspeed = (1.0 + p.scale_airspeed)*s.pitot + p.bias_airspeed + p.noise_airspeed*n0
+    m.alpha = (1.0 + p.scale_alpha)*s.filtered_alpha + p.bias_alpha + p.noise_alpha*n1
+    m.beta = (1.0 + p.scale_beta)*s.filtered_beta + p.bias_beta + p.noise_beta*n2
+    m.elevator = s.filtered_elevator + p.bias_elevator + p.noise_elevator*n3
+    n0, n1, n2, n3 = normal4(s.seed, SENSOR_STREAM, s.step, 1)
+    m.p = (1.0 + p.scale_p)*s.filtered_p + p.bias_p + p.noise_p*n0
+    m.q = (1.0 + p.scale_q)*s.filtered_q + p.bias_q + p.noise_q*n1
+    m.r = (1.0 + p.scale_r)*s.filtered_r + p.bias_r + p.noise_r*n2
+    m.aileron = s.filtered_aileron + p.bias_aileron + p.noise_aileron*n3
+    n0, n1, n2, n3 = normal4(s.seed, SENSOR_STREAM, s.step, 2)
+    m.ax = (1.0 + p.scale_ax)*s.filtered_ax + p.bias_ax + p.noise_ax*n0
+    m.ay = (1.0 + p.scale_ay)*s.filtered_ay + p.bias_ay + p.noise_ay*n1
+    m.az = (1.0 + p.scale_az)*s.filtered_az + p.bias_az + p.noise_az*n2
+    m.rudder = s.filtered_rudder + p.bias_rudder + p.noise_rudder*n3
+
+
+@kernel
+def read_attitude_and_engines(x, s, m, p, u, thrust_left, thrust_right, hinge_e, hinge_a, static) -> None:
+    """Attitude (heading kept continuous), altitude, engines, hinge moments (blocks 3 and 4)."""
+    phi, theta, psi = euler_angles(x.e0, x.e1, x.e2, x.e3)
+    turn = psi - m.psi
+    psi = m.psi + turn - 2.0*math.pi*math.floor(turn/(2.0*math.pi) + 0.5)
+    n0, n1, n2, n3 = normal4(s.seed, SENSOR_STREAM, s.step, 3)
+    m.phi = phi + p.bias_phi + p.noise_phi*n0
+    m.theta = theta + p.bias_theta + p.noise_theta*n1
+    m.psi = psi + p.noise_psi*n2
+    m.pressure = static + p.bias_pressure + p.noise_pressure*n3
+    m.altitude = pressure_altitude(m.pressure)
+    n0, n1, n2, n3 = normal4(s.seed, SENSOR_STREAM, s.step, 4)
+    m.thrust_left = (1.0 + p.scale_thrust)*thrust_left + p.noise_thrust*n0
+    m.thrust_right = (1.0 + p.scale_thrust)*thrust_right + p.noise_thrust*n1
+    m.hinge_moment_elevator = hinge_e + p.noise_hinge_moment*n2
+    m.hinge_moment_aileron = hinge_a + p.noise_hinge_moment*n3
+    m.torque_left, m.torque_right = torque(x.power_left, p), torque(x.power_right, p)
+    m.rpm_left, m.rpm_right = p.propeller_rpm, p.propeller_rpm
+    m.flap = x.flap
+    m.throttle_left, m.throttle_right = u.throttle_left, u.throttle_right
+
+
+@kernel
+def read_slow(s, m, p) -> None:
+    """Temperature and cloud probes, once a second (block 5)."""
+    n0, n1, n2, _n3 = normal4(s.seed, SENSOR_STREAM, s.step, 5)
+    m.temperature = s.temperature + p.bias_temperature + p.noise_temperature*n0
+    m.lwc = max(0.0, s.lwc*(1.0 + p.noise_lwc*n1))
+    m.mvd = s.mvd*max(0.0, 1.0 + p.noise_mvd*n2) if s.lwc > 0.0 else 0.0
+
+
+@kernel
+def read_instruments(x, s, m, c, p, u, slow: bool, dt: float) -> float:
+    """One sample of every instrument into `m`; returns the true normal load factor -Fz/(m g)."""
+    (fx, fy, fz, _l, _m, _n, airspeed, alpha, beta, _rho, thrust_left, thrust_right,
+     hinge_e, hinge_a, static) = forces(x, s, c, p)
+    filter_flow_and_inertial(x, s, c, p, airspeed, alpha, beta, fx, fy, fz, dt)
+    read_fast(s, m, p)
+    read_attitude_and_engines(x, s, m, p, u, thrust_left, thrust_right, hinge_e, hinge_a, static)
+    north, east, _down = to_local(x.e0, x.e1, x.e2, x.e3, x.u, x.v, x.w)
+    m.ground_speed = math.sqrt(north*north + east*east)
+    m.track = math.atan2(east, north)
+    if slow:
+        read_slow(s, m, p)
+    return -fz/(c.mass*p.gravity_sea_level)
