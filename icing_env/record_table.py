@@ -159,6 +159,8 @@ def write_whole(path: Path, meta: RecordMeta, write_data: Callable[[Path], None]
         if side:
             toml.write_text(tomli_w.dumps(side), encoding="utf-8")
             os.replace(toml, path.with_suffix(".toml"))
+        else:  # an older record's side file must not speak for this one
+            path.with_suffix(".toml").unlink(missing_ok=True)
         os.replace(data, path)
 
 
