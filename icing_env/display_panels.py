@@ -45,7 +45,7 @@ def _bar(pen: Pen, box: Box, share: float, colour: Colour) -> None:
 
 def _lamp(pen: Pen, box: Box, name: str, on: bool, colour: Colour = GREEN) -> None:
     """Annunciator: lit with dark letters, or dark with dim letters."""
-    pen.rectangle(box, colour if on else WELL, mix(colour, PANEL, 0.0) if on else EDGE, radius=4.0)
+    pen.rectangle(box, colour if on else WELL, colour if on else EDGE, radius=4.0)
     at = ((box[0] + box[2]) / 2.0, (box[1] + box[3]) / 2.0)
     pen.text(at, name, 14.0, BLACK if on else DIM, bold=True)
 
@@ -58,17 +58,35 @@ def status(pen: Pen, view: DisplayView) -> None:
     seconds = int(clamp(view.time, 0.0, 359999.0))
     clock = f"{seconds // 60:02d}:{seconds % 60:02d}" if seconds < 3600 else f"{seconds / 3600.0:.2f} h"
     pen.text((61.0, middle), clock, 18.0, INK, bold=True)
-    active = abs(view.intervention) > 0.0
-    cell = (118, top, 518, bottom)
-    pen.rectangle(cell, AMBER if active else PANEL, AMBER if active else EDGE, radius=6.0)
-    if active:
-        size = math.degrees(clamp(abs(view.intervention), 0.0, math.pi))
-        pen.text((318.0, middle), f"ALPHA PROT   {size:.1f}° elevator", 19.0, BLACK, bold=True)
-    else:
-        pen.text((318.0, middle), "ENVELOPE NORMAL", 17.0, GREEN, bold=True)
+    text, colour, loud = envelope_cue(view)
+    pen.rectangle((118, top, 518, bottom), colour if loud else PANEL, colour if loud else EDGE, radius=6.0)
+    pen.text((318.0, middle), text, 17.0, BLACK if loud else colour, bold=True)
     panel(pen, (530, top, 690, bottom))
     pen.text((544.0, middle), "LOAD", 14.0, DIM, "l", bold=True)
     pen.text((676.0, middle), f"{clamp(view.load_factor, -99.0, 99.0):.2f} g", 18.0, INK, "r", bold=True)
+
+
+def envelope_cue(view: DisplayView) -> tuple[str, Colour, bool]:
+    """What to say about the envelope, in which colour, and whether to fill the cell with it.
+
+    The protection's own action comes first, then a limit that is passed without it; a reading or a limit that is not
+    finite makes the answer unknown, never normal.
+    """
+    if abs(view.intervention) > 0.0:
+        size = math.degrees(clamp(abs(view.intervention), 0.0, math.pi))
+        return f"ALPHA PROT   {size:.1f}° elevator", AMBER, True
+    margins = {
+        "ALPHA": view.alpha_limit - view.alpha,
+        "SPEED": view.airspeed - view.airspeed_limit,
+        "BANK": view.bank_limit - abs(math.remainder(view.phi, 2.0 * math.pi) if math.isfinite(view.phi) else math.nan),
+    }
+    passed = [name for name, margin in margins.items() if margin < 0.0]
+    if passed:
+        stalled = view.alpha > max(view.alpha_limit, view.alpha_stall_clean)
+        return "BEYOND LIMIT:  " + "  ".join(passed), RED if stalled else AMBER, stalled
+    if not all(math.isfinite(margin) for margin in margins.values()):
+        return "ENVELOPE UNKNOWN", AMBER, False
+    return "ENVELOPE NORMAL", GREEN, False
 
 
 def ice(pen: Pen, view: DisplayView) -> None:
@@ -176,16 +194,16 @@ def surfaces(pen: Pen, view: DisplayView) -> None:
 def engines(pen: Pen, view: DisplayView) -> None:
     """Power levers, percent."""
     panel(pen, ENGINES, "POWER %")
-    for name, lever, x in (("L", view.throttle_left, 570.0), ("R", view.throttle_right, 640.0)):
+    for name, lever, x in (("L", view.throttle_left, 575.0), ("R", view.throttle_right, 645.0)):
         share = clamp(lever, 0.0, 1.0)
-        top, bottom = 568.0, 660.0
+        top, bottom = 564.0, 648.0
         pen.rectangle((x - 13.0, top, x + 13.0, bottom), WELL, radius=3.0)
         height = (bottom - top) * share
         if height >= 1.0:
             pen.rectangle((x - 13.0, bottom - height, x + 13.0, bottom), mix(PANEL, GREEN, 0.6))
         pen.line([(x - 18.0, bottom - height), (x + 18.0, bottom - height)], GREEN, 4.0)
-        pen.text((x - 27.0, bottom - 6.0), name, 15.0, DIM, bold=True)
-        pen.text((x, 684.0), f"{100.0 * share:.0f}", 19.0, INK, bold=True)
+        pen.text((x, 668.0), f"{100.0 * share:.0f}", 18.0, INK, bold=True)
+        pen.text((x, 690.0), name, 14.0, DIM, bold=True)
     for quarter in range(5):
-        y = 660.0 - 23.0 * quarter
-        pen.line([(601.0, y), (609.0, y)], EDGE, 2.0)
+        y = 648.0 - 21.0 * quarter
+        pen.line([(605.0, y), (615.0, y)], EDGE, 2.0)

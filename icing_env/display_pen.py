@@ -64,6 +64,12 @@ def clamp(value: float, low: float, high: float) -> float:
     return min(max(value, low), high)
 
 
+def polar(centre: Point, radius: float, degrees: float) -> Point:
+    """Point at an angle clockwise from the top."""
+    angle = math.radians(degrees)
+    return centre[0] + radius * math.sin(angle), centre[1] - radius * math.cos(angle)
+
+
 class Pen:
     """Draws on a Pillow image in layout units.
 
@@ -113,10 +119,17 @@ class Pen:
         """Arc from `start` to `end`, degrees clockwise from the top; `radius` is that of its middle line."""
         x, y = self._pixel(centre)
         outer = (radius + width / 2.0) * self.scale
-        self._draw.arc([x - outer, y - outer, x + outer, y + outer], start - 90.0, end - 90.0, colour, self._width(width))
+        box = [x - outer, y - outer, x + outer, y + outer]
+        self._draw.arc(box, start - 90.0, end - 90.0, colour, self._width(width))
 
     def text(
-        self, at: Point, text: str, size: float, colour: Colour = INK, anchor: str = "m", bold: bool = False,
+        self,
+        at: Point,
+        text: str,
+        size: float,
+        colour: Colour = INK,
+        anchor: str = "m",
+        bold: bool = False,
         turn: float = 0.0,
     ) -> None:
         """One line of text, vertically centred on `at`.
