@@ -152,8 +152,8 @@ def read_slow(s, m, p) -> None:
 
 
 @kernel
-def read_instruments(x, s, m, c, p, u, slow: bool, dt: float) -> float:
-    """One sample of every instrument into `m`; returns the true normal load factor -Fz/(m g)."""
+def read_instruments(x, s, m, c, p, u, o, slow: bool, dt: float) -> None:
+    """One sample of every instrument into `m`, and the true air data and load factor into `o`."""
     (fx, fy, fz, _l, _m, _n, airspeed, alpha, beta, _rho, thrust_left, thrust_right,
      hinge_e, hinge_a, static) = forces(x, s, c, p)
     filter_flow_and_inertial(x, s, c, p, airspeed, alpha, beta, fx, fy, fz, dt)
@@ -164,4 +164,5 @@ def read_instruments(x, s, m, c, p, u, slow: bool, dt: float) -> float:
     m.track = math.atan2(east, north)
     if slow:
         read_slow(s, m, p)
-    return -fz/(c.mass*p.gravity_sea_level)
+    o.load_factor = -fz/(c.mass*p.gravity_sea_level)
+    o.airspeed, o.alpha, o.beta = airspeed, alpha, beta

@@ -171,6 +171,14 @@ CURRENT_FIELDS: list[Field] = [
     ("efficiency", "1", "propeller efficiency factor, ice included"),
 ]
 
+# The truth that tasks and scores look at, never estimators or controllers.
+OUTCOME_FIELDS: list[Field] = [
+    ("airspeed", "m/s", "true airspeed"),
+    ("alpha", "rad", "true angle of attack"),
+    ("beta", "rad", "true sideslip"),
+    ("load_factor", "1", "normal load factor, -Fz/(m g0)"),
+]
+
 
 def structured(fields: list[Field], *extra: tuple[str, str]) -> np.dtype:
     """Structured type of float64 fields, followed by `extra` (name, numpy type) pairs."""
@@ -182,6 +190,7 @@ STATE = structured(STATE_FIELDS, ("step", "i8"), ("seed", "u8"))
 COMMAND = structured(COMMAND_FIELDS)
 MEASUREMENT = structured(MEASUREMENT_FIELDS)
 CURRENT = structured(CURRENT_FIELDS)
+OUTCOME = structured(OUTCOME_FIELDS)
 N_CONTINUOUS = len(CONTINUOUS_FIELDS)
 
 

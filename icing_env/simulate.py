@@ -1,0 +1,161 @@
+"""The only loop over aircraft: one environment step of every row, and the arrays it works on.
+
+Order of one step (docs/model.md): once a second cloud and accretion; ice protection; coefficients with ice; gusts,
+then held; Runge-Kutta substeps with commands held; instruments. A row sees nothing of other rows, so one aircraft
+flies bit for bit the same alone and in a batch, on one thread or several.
+"""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icing_env.accretion import advance_accretion
+from icing_env.atmosphere import GAS_CONSTANT, pressure
+from icing_env.cloud import advance_cloud
+from icing_env.dynamics import air_data
+from icing_env.ice_protection import advance_protection
+from icing_env.integrate import STAGES, normalise, rk4
+from icing_env.jit import entry, kernel
+from icing_env.parameters import PARAMETERS
+from icing_env.sensors import read_instruments, start_instruments
+from icing_env.severity import iced_aircraft
+from icing_env.turbulence import advance_turbulence, start_turbulence
+from icing_env.types import COMMAND, CONTINUOUS, CURRENT, MEASUREMENT, N_CONTINUOUS, OUTCOME, STATE
+
+
+
+@kernel
+def advance_weather_and_ice(s, p, airspeed: float, dt: float) -> None:
+    """The slow clock: cloud along the track and ice on every surface."""
+    advance_cloud(s, p, airspeed, dt)
+    density = p.density_factor*pressure(s.altitude)/(GAS_CONSTANT*s.temperature)
+    advance_accretion(s, p, airspeed, density, dt)
+
+
+@kernel
+def fly(s, row, stage, rows, total, m, c, p, u, o, substeps: int, dt: float, slow_every: int) -> None:
+    """One environment step of one aircraft."""
+    slow = s.step % slow_every == 0
+    airspeed = o.airspeed
+    if slow:
+        advance_weather_and_ice(s, p, airspeed, dt*slow_every)
+    advance_protection(s, p, u, dt)
+    iced_aircraft(s, p, c)
+    advance_turbulence(s, p, airspeed, dt)
+    for i in range(N_CONTINUOUS):
+        rows[0, i] = row[i]
+    for _ in range(substeps):
+        rk4(stage, rows, total, s, c, p, u, dt/substeps)
+    normalise(stage[0])
+    for i in range(N_CONTINUOUS):
+        row[i] = rows[0, i]
+    s.step += 1
+    m.time = s.step*dt
+    read_instruments(stage[0], s, m, c, p, u, o, slow, dt)
+
+
+@entry
+def advance(state, state_rows, stage, rows, total, measurement, current, parameters, command, outcome,
+            substeps, dt, slow_every) -> None:
+    """One environment step of every row; `parameters` has a row per aircraft or one for all."""
+    shared = len(parameters) == 1
+    for i in range(len(state)):
+        fly(state[i], state_rows[i], stage, rows, total, measurement[i], current[i],
+            parameters[0 if shared else i], command[i], outcome[i], substeps, dt, slow_every)
+
+
+@entry
+def start(state, state_rows, stage, rows, measurement, current, parameters, command, outcome, dt) -> None:
+    """After the continuous state was set: settle gusts and instruments and take a first sample."""
+    shared = len(parameters) == 1
+    for i in range(len(state)):
+        s, c, p = state[i], current[i], parameters[0 if shared else i]
+        for j in range(N_CONTINUOUS):
+            rows[0, j] = state_rows[i, j]
+        iced_aircraft(s, p, c)
+        start_turbulence(s, p, air_data(stage[0], s, p)[0])
+        start_instruments(stage[0], s, c, p)
+        measurement[i].time = 0.0
+        measurement[i].psi = 0.0
+        read_instruments(stage[0], s, measurement[i], c, p, command[i], outcome[i], True, dt)
+
+
+def scratch() -> tuple[NDArray, NDArray, NDArray]:
+    """Work space of one thread: Runge-Kutta stages as records, the same memory as rows, and a sum."""
+    stage = np.zeros(STAGES, CONTINUOUS)
+    return stage, stage.view(np.float64).reshape(STAGES, N_CONTINUOUS), np.zeros(N_CONTINUOUS)
+
+
+class Fleet:
+    """Arrays of `n` aircraft and the step over them.
+
+    Args:
+        parameters: PARAMETERS array, one row for all or one per aircraft.
+        n: number of aircraft.
+        dt: environment step [s].
+        substeps: Runge-Kutta steps per environment step.
+        threads: slices of the batch that run side by side; 1 runs in the caller.
+
+    Attributes:
+        state, measurement, current, command, outcome: structured arrays of length `n`.
+    """
+
+    def __init__(self, parameters: NDArray, n: int = 1, dt: float = 0.02, substeps: int = 2, threads: int = 1):
+        if parameters.dtype != PARAMETERS or len(parameters) not in (1, n):
+            raise ValueError(f"parameters must be a PARAMETERS array of 1 or {n} rows")
+        self.parameters, self.n, self.dt, self.substeps = parameters, n, dt, substeps
+        self.slow_every = max(1, round(1.0/dt))
+        self.state = np.zeros(n, STATE)
+        self.state_rows = self.state.view(np.float64).reshape(n, -1)
+        self.measurement = np.zeros(n, MEASUREMENT)
+        self.current = np.zeros(n, CURRENT)
+        self.command = np.zeros(n, COMMAND)
+        self.outcome = np.zeros(n, OUTCOME)
+        bounds = np.linspace(0, n, min(threads, n) + 1).astype(int)
+        self._slices = [slice(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
+        self._scratch = [scratch() for _ in self._slices]
+        self._pool = ThreadPoolExecutor(len(self._slices)) if len(self._slices) > 1 else None
+        self._bind()
+
+    def _bind(self) -> None:
+        """Arguments of each slice, made once: building views costs more than the flight."""
+        shared = len(self.parameters) == 1
+        self._arguments = [
+            (self.state[k], self.state_rows[k], *work, self.measurement[k], self.current[k],
+             self.parameters if shared else self.parameters[k], self.command[k], self.outcome[k],
+             self.substeps, self.dt, self.slow_every)
+            for k, work in zip(self._slices, self._scratch, strict=True)
+        ]
+
+    def start(self, rows: slice | NDArray = slice(None)) -> None:
+        """Settle gusts, coefficients and instruments of the given rows on their continuous state."""
+        state, measurement, current, outcome = (
+            self.state[rows], self.measurement[rows], self.current[rows], self.outcome[rows])
+        stage, stage_rows, _ = self._scratch[0]
+        start(state, state.view(np.float64).reshape(len(state), -1), stage, stage_rows, measurement, current,
+              self.parameters if len(self.parameters) == 1 else self.parameters[rows],
+              self.command[rows], outcome, self.dt)
+        if not isinstance(rows, slice):  # fancy indexing made copies
+            self.state[rows], self.measurement[rows], self.current[rows] = state, measurement, current
+            self.outcome[rows] = outcome
+
+    def step(self) -> None:
+        """Advance every aircraft by one environment step under its command."""
+        if self._pool is None:
+            advance(*self._arguments[0])
+        else:
+            list(self._pool.map(lambda arguments: advance(*arguments), self._arguments))
+
+    def memory(self) -> int:
+        """Bytes held by the arrays."""
+        return sum(a.nbytes for a in (self.state, self.measurement, self.current, self.command, self.outcome,
+                                      self.parameters))
+
+
+def processors() -> int:
+    """Processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
