@@ -1,0 +1,108 @@
+"""One channel of the recursive H-infinity identifier: a scalar state, m parameters, an accelerometer if there is one.
+
+    xdot = a(t)' theta + b(t) + d w        y = x + n v        y_a = a_a(t)' theta + n_a v_a
+
+Sources: Didinsky, Pan, Basar, Automatica 31(9), 1995 (noise-perturbed full-state information, NPFSI); Basar and
+Bernhard, H-infinity-Optimal Control. The estimator that keeps
+int |theta - thetahat|^2_Q <= gamma^2 (int w^2 + v^2 + v_a^2 + |theta(0) - thetahat(0)|^2_Q0) carries, with
+Sigma = [[S1, S2], [S2', S3]] > 0 and B = Sigma^-1,
+
+    S1dot = -d^2 S1^2 + 1/n^2             S2dot = -S1 a' - d^2 S1 S2
+    S3dot = -a S2 - S2' a' - d^2 S2' S2 + a_a a_a'/n_a^2 - Q/gamma^2
+    xhatdot = a' thetahat + b + B1 (y - xhat)/n^2
+    thetahatdot = B2' (y - xhat)/n^2 + B3 a_a (y_a - a_a' thetahat)/n_a^2.
+
+S1 starts at rest, 1/(d n), and stays there. Change the variables, without approximation, to
+f = -S2'/S1, Pi = S3 - S2' S2/S1 = B3^-1 and zeta = xhat - f' thetahat; then Sigma is block-diagonalised:
+
+    fdot    = a - (d/n) f                        the regressors behind the observer's own filter
+    zetadot = b + (d/n) (y - zeta)               and everything else behind the same filter
+    Pidot   = (1 - gamma^-2) Q,                  Q = f f'/n^2 + a_a a_a'/n_a^2 (so that gamma* = 1)
+    thetahatdot = Pi^-1 [f (y - zeta - f' thetahat)/n^2 + a_a (y_a - a_a' thetahat)/n_a^2].
+
+The filters advance by RK4 with inputs interpolated to the half step (`filter_step`). The equations of Pi and
+thetahat are stiff (rates of 1e5/s in a rudder doublet, where RK4 needs less than 2.8/h), but with f held over the
+sample they have a solution in closed form, which `learn` applies: positive definite for every step size exactly
+when gamma >= 1, with a finite escape when gamma < 1 that is caught as such. Each row of data enters by itself,
+in turn, the accelerometer's as the state's.
+
+Wandering parameters (the time-varying form): B3dot = K0 - (1 - gamma^-2) B3 Q B3, capped at B3(0) (`forget`).
+The state is taken to move with the parameter through the filter's memory n/d, so that f is left as it is.
+"""
+
+from __future__ import annotations
+
+import math
+
+from icing_env.jit import kernel
+
+
+@kernel
+def filter_step(x: float, u0: float, u1: float, rate: float, dt: float) -> float:
+    """xdot = u(t) - rate x over one sample by RK4, u linear between u0 and u1."""
+    half = 0.5 * (u0 + u1)
+    k1 = u0 - rate * x
+    k2 = half - rate * (x + 0.5 * dt * k1)
+    k3 = half - rate * (x + 0.5 * dt * k2)
+    k4 = u1 - rate * (x + dt * k3)
+    return x + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+
+
+@kernel
+def shrink(strength: float, kappa: float) -> float:
+    """(1 + kappa s)^(-1/kappa): what is left of a residual after a sample that carries the information s = dt f'B f/n^2.
+
+    kappa = 1 - gamma^-2. It is 1/(1 + s) for the Kalman filter (gamma infinite) and exp(-s) at gamma = 1.
+    The caller has checked that 1 + kappa s > 0.
+    """
+    if abs(kappa) < 1e-9:
+        return math.exp(-strength)
+    if kappa == 1.0:
+        return 1.0 / (1.0 + strength)
+    return math.exp(-math.log1p(kappa * strength) / kappa)
+
+
+@kernel
+def learn(theta, b3, gain, first, packed, m, row, factor, target, information, kappa):  # type: ignore[no-untyped-def]
+    """Advance thetahat and B3 over one sample of one row of data, r = factor row[first:first + m], in place.
+
+    With r held and `information` = dt/n^2, the equations Bdot = -kappa B r r'B/n^2 and
+    thetahatdot = B r (target - r'thetahat)/n^2 keep the direction g = B r and give, with s = information r'g,
+        B <- B - kappa information/(1 + kappa s) g g',    thetahat <- thetahat + g e/(r'g) (1 - shrink(s)).
+    theta, row: (24,); b3: (69,) lower triangles; gain: (6,) scratch. Returns False at a finite escape
+    (1 + kappa s <= 0, only for gamma < 1) or when B3 is no longer positive, leaving theta and B3 as they were.
+    """
+    along, residual = 0.0, target
+    for i in range(m):
+        total = 0.0
+        for j in range(m):
+            k = packed + (i * (i + 1) // 2 + j if j <= i else j * (j + 1) // 2 + i)
+            total += b3[k] * row[first + j]
+        gain[i] = factor * total
+        along += factor * row[first + i] * gain[i]
+        residual -= factor * row[first + i] * theta[first + i]
+    strength = information * along
+    if not (strength >= 0.0 and 1.0 + kappa * strength > 0.0):
+        return False
+    if strength == 0.0:
+        return True
+    step = residual * (1.0 - shrink(strength, kappa)) / along
+    down = kappa * information / (1.0 + kappa * strength)
+    for i in range(m):
+        theta[first + i] += gain[i] * step
+        for j in range(i + 1):
+            b3[packed + i * (i + 1) // 2 + j] -= down * gain[i] * gain[j]
+    return True
+
+
+@kernel
+def forget(b3, scale, first, packed, m, wander, wander_first, q0):  # type: ignore[no-untyped-def]
+    """Add K0 dt to the diagonal of B3, never beyond its starting value scale^2/q0 (no wind-up in calm air).
+
+    wander: K0 dt per scale^2 of all parameters but the first of the channel, wander_first: of that one.
+    """
+    for i in range(m):
+        k = packed + i * (i + 1) // 2 + i
+        unit = scale[first + i] * scale[first + i]
+        added = (wander_first if i == 0 else wander) * unit
+        b3[k] += max(0.0, min(added, unit / q0 - b3[k]))

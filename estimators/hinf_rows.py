@@ -1,0 +1,106 @@
+"""The rows of the H-infinity identifier: what each channel's derivative is, linear in that channel's coefficients.
+
+Standard rigid-body equations (Klein and Morelli, Aircraft System Identification, chapter 3), Ixz = + int x z dm.
+Everything that is not an estimated coefficient is formed from measured quantities and goes into b.
+`rows` leaves, in the order of ESTIMATED_NAMES, the regressors a of the six state equations in row["row"], the rest
+in row["rest"], the states as measured in row["y"], and for drag, lift and side force what the accelerometer says
+(row["accelerometer"]) with the factor by which the same regressors enter it (row["factor"]).
+"""
+
+from __future__ import annotations
+
+import math
+
+from icing_env.jit import kernel
+
+GRAVITY = 9.80665  # m/s2, standard
+GAS_CONSTANT = 287.05287  # J/(kg K), 1976 standard atmosphere
+
+
+@kernel
+def clean_zero_lift_drag(af) -> float:  # type: ignore[no-untyped-def]
+    """Drag coefficient of the clean aircraft at zero lift: CL = 0 and CX there give CD = -CX/cos(alpha_0)."""
+    alpha = af["CZ_0"] / (af["CX_0"] - af["CZ_alpha"])
+    return -(af["CX_0"] + alpha * (af["CX_alpha"] + alpha * af["CX_alpha2"])) / math.cos(alpha)
+
+
+@kernel
+def force_rows(ob, m, af):  # type: ignore[no-untyped-def]
+    """Drag, lift and side force: states airspeed, alpha, beta; accelerometers x, z, y.
+
+    Drag:  a_x = k (CX_clean(alpha) - (CD_0 - CD_0,clean) cos alpha) + T/m, k = qbar S/m: the lift-dependent part keeps
+    the clean shape along body x, so that CD_0 is the drag at zero lift with thrust removed.
+    Lift:  k CL = (a_x - T/m) sin alpha - a_z cos alpha; CL_q and the shape of CX a priori.
+    Side:  a_y = k (CY_0 + CY_beta beta + CY_p p^ + CY_r r^ + CY_rudder rudder); CY_p a priori.
+    """
+    row, rest = ob["row"], ob["rest"]
+    v, alpha, beta, p, q, r = m["airspeed"], m["alpha"], m["beta"], m["p"], m["q"], m["r"]
+    ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
+    st, ct, sp, cp = math.sin(m["theta"]), math.cos(m["theta"]), math.sin(m["phi"]), math.cos(m["phi"])
+    qbar = 0.5 * m["pressure"] / (GAS_CONSTANT * m["temperature"]) * v * v
+    k = qbar * af["wing_area"] / af["mass"]
+    thrust = (m["thrust_left"] + m["thrust_right"]) / af["mass"]
+    half_span, half_chord = 0.5 * af["span"] / v, 0.5 * af["chord"] / v
+
+    cx = af["CX_0"] + alpha * (af["CX_alpha"] + alpha * af["CX_alpha2"])
+    known = k * (cx + clean_zero_lift_drag(af) * ca) + thrust
+    row[0] = -k * ca * ca * cb
+    rest[0] = ca * cb * known + sb * m["ay"] + sa * cb * m["az"] + GRAVITY * (
+        sb * sp * ct + sa * cb * cp * ct - ca * cb * st)
+    ob["accelerometer"][0], ob["factor"][0] = m["ax"] - known, 1.0 / (ca * cb)
+
+    lift = -k / (v * cb)
+    row[1], row[2], row[3] = lift, lift * alpha, lift * m["elevator"]
+    pitching = k * af["CZ_q"] * half_chord * q
+    rest[1] = q - sb / cb * (p * ca + r * sa) + (
+        GRAVITY * (sa * st + ca * cp * ct) + pitching - thrust * sa) / (v * cb)
+    ob["accelerometer"][1] = m["az"] * ca - (m["ax"] - thrust) * sa - pitching
+    ob["factor"][1] = v * cb
+
+    side = k * cb / v
+    row[8], row[9], row[10], row[11] = side, side * beta, side * r * half_span, side * m["rudder"]
+    rolling = k * af["CY_p"] * half_span * p
+    rest[3] = p * sa - r * ca + (rolling * cb - sb * (m["ax"] * ca + m["az"] * sa) + GRAVITY * (
+        ca * sb * st + cb * sp * ct - sa * sb * cp * ct)) / v
+    ob["accelerometer"][2], ob["factor"][2] = m["ay"] - rolling, v / cb
+    ob["y"][0], ob["y"][1], ob["y"][3] = v, alpha, beta
+    return qbar
+
+
+@kernel
+def moment_rows(ob, m, af, qbar):  # type: ignore[no-untyped-def]
+    """Pitch, roll and yaw. The states p - (Ixz/Ixx) r and r - (Ixz/Izz) p leave one moment in each equation.
+
+    Iyy qdot = qbar S c Cm + (Izz - Ixx) p r + Ixz (r^2 - p^2);
+    Ixx pdot - Ixz rdot = qbar S b Cl + Ixz p q - (Izz - Iyy) q r;
+    Izz rdot - Ixz pdot = qbar S b Cn - Ixz q r - (Iyy - Ixx) p q.
+    A moment of thrust about the c.g. is not known to the observer and counts as Cm_0 or Cn_0.
+    """
+    row, rest = ob["row"], ob["rest"]
+    v, beta, p, q, r = m["airspeed"], m["beta"], m["p"], m["q"], m["r"]
+    xx, yy, zz, xz = af["inertia_xx"], af["inertia_yy"], af["inertia_zz"], af["inertia_xz"]
+    half_span, force = 0.5 * af["span"] / v, qbar * af["wing_area"]
+
+    pitch = force * af["chord"] / yy
+    row[4], row[5] = pitch, pitch * m["alpha"]
+    row[6], row[7] = pitch * 0.5 * af["chord"] / v * q, pitch * m["elevator"]
+    rest[2] = ((zz - xx) * p * r + xz * (r * r - p * p)) / yy
+    for channel, inertia in ((12, xx), (18, zz)):
+        moment = force * af["span"] / inertia
+        row[channel], row[channel + 1] = moment, moment * beta
+        row[channel + 2], row[channel + 3] = moment * half_span * p, moment * half_span * r
+        row[channel + 4], row[channel + 5] = moment * m["aileron"], moment * m["rudder"]
+    rest[4] = (xz * p * q - (zz - yy) * q * r) / xx
+    rest[5] = (-xz * q * r - (yy - xx) * p * q) / zz
+    ob["y"][2], ob["y"][4], ob["y"][5] = q, p - xz / xx * r, r - xz / zz * p
+
+
+@kernel
+def readable(m) -> bool:  # type: ignore[no-untyped-def]
+    """True if every channel the rows need is finite and the air data are physical."""
+    total = (
+        m["alpha"] + m["beta"] + m["p"] + m["q"] + m["r"] + m["phi"] + m["theta"] + m["ax"] + m["ay"] + m["az"]
+        + m["elevator"] + m["aileron"] + m["rudder"] + m["thrust_left"] + m["thrust_right"]
+        + m["airspeed"] + m["pressure"] + m["temperature"]
+    )  # fmt: skip
+    return math.isfinite(total) and m["airspeed"] > 5.0 and m["pressure"] > 0.0 and m["temperature"] > 0.0
