@@ -1,0 +1,240 @@
+"""A classical autopilot: pitch, altitude, climb-rate and airspeed holds; bank and heading holds; yaw damper.
+
+Successive loop closure (McRuer, Ashkenas & Graham, Aircraft Dynamics and Automatic Control, chapters 7-8; Stevens, Lewis
+& Johnson, Aircraft Control and Simulation, 3rd ed., section 4.6), with the structure of the pitch and roll attitude
+holds of the Smart Icing Systems autopilot. Signs: positive elevator pitches down, positive aileron rolls left,
+positive rudder yaws left; so too little pitch gives negative elevator, too little bank negative aileron.
+
+* s = qbar_reference / qbar scales every surface gain, as surface power goes with dynamic pressure
+* vertical speed: baro-inertial complementary filter of second order, undisturbed by gusts on the vane
+* theta_command = pitch trim + K (climb-rate error)/V + compensation of the lift lost in a bank
+* elevator = trim + s [K_theta (theta - theta_command) + K_q (q - q_turn)], q_turn = (g/V) sin phi tan phi
+* bank_command = atan(V K_psi (heading error)/g), slewed; aileron = trim + s [K_phi (phi - bank_command) + K_p p]
+* rudder = trim + s K_r (r - r_turn), r_turn = (g/V) sin phi cos theta; its trim keeps the ball centred
+* throttle = trim + K_V (airspeed error) + K_climb (climb-rate command)
+
+The advisory limits what is asked for: bank, lowest airspeed (raises the airspeed target, and the climb yields to the
+airspeed), angle of attack (lowers the pitch command), flap.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers.kernels import air_density, airspeed_of, clip, integrated, wrapped
+from controllers.parameters import read_parameters
+from icing_env.atmosphere import G0
+from icing_env.jit import entry, kernel
+from icing_env.types import Field, structured
+
+TARGET_FIELDS: list[Field] = [
+    ("pitch_mode", "0..2", "0 holds theta, 1 altitude, 2 climb_rate"),
+    ("theta", "rad", "pitch angle to hold"),
+    ("altitude", "m", "pressure altitude to hold"),
+    ("climb_rate", "m/s", "vertical speed to hold, positive up"),
+    ("speed_mode", "0..1", "0 sets throttle, 1 holds airspeed"),
+    ("throttle", "0..1", "power lever to set"),
+    ("airspeed", "m/s", "true airspeed to hold"),
+    ("roll_mode", "0..1", "0 holds phi, 1 heading"),
+    ("phi", "rad", "bank angle to hold"),
+    ("heading", "rad", "heading to hold"),
+    ("flap", "rad", "flap to set"),
+]
+AUTOPILOT_FIELDS: list[Field] = [
+    ("engaged", "0/1", "0 until the first step, which starts the integrators where the controls are"),
+    ("altitude", "m", "altitude of the complementary filter"),
+    ("climb_rate", "m/s", "vertical speed of the complementary filter"),
+    ("pitch_trim", "rad", "integrator of the climb-rate hold"),
+    ("elevator_trim", "rad", "integrator of the pitch hold"),
+    ("throttle_trim", "0..1", "integrator of the airspeed hold"),
+    ("bank_command", "rad", "bank asked for now, slewed"),
+    ("aileron_trim", "rad", "integrator of the bank hold"),
+    ("rudder_trim", "rad", "integrator of the lateral specific force"),
+]
+GAINS_FIELDS: list[Field] = [
+    ("qbar_reference", "Pa", "dynamic pressure at which the surface gains hold"),
+    ("scale_min", "1", "least scaling of the surface gains"),
+    ("scale_max", "1", "largest scaling of the surface gains"),
+    ("K_theta", "1", "elevator per pitch error"),
+    ("K_theta_integral", "1/s", "elevator rate per pitch error"),
+    ("K_q", "s", "elevator per pitch rate"),
+    ("K_climb", "1", "pitch command per error of the flight-path angle"),
+    ("K_climb_integral", "1/s", "its integral"),
+    ("K_altitude", "1/s", "climb-rate command per altitude error"),
+    ("K_turn", "rad", "pitch added per excess load factor in a bank, at the reference dynamic pressure"),
+    ("vertical_bandwidth", "rad/s", "natural frequency of the baro-inertial filter"),
+    ("vertical_damping", "1", "damping of the baro-inertial filter"),
+    ("K_airspeed", "s/m", "throttle per airspeed error"),
+    ("K_airspeed_integral", "1/m", "throttle rate per airspeed error"),
+    ("K_throttle_climb", "s/m", "throttle per climb-rate command"),
+    ("K_speed_priority", "1", "climb rate allowed per airspeed above the limit"),
+    ("K_phi", "1", "aileron per bank error"),
+    ("K_phi_integral", "1/s", "aileron rate per bank error"),
+    ("K_p", "s", "aileron per roll rate"),
+    ("K_heading", "1/s", "turn rate per heading error"),
+    ("K_r", "s", "rudder per yaw rate beyond that of the turn"),
+    ("K_ay_integral", "rad s/m", "rudder rate per lateral specific force"),
+    ("climb_max", "m/s", "largest climb and descent rate asked for"),
+    ("theta_min", "rad", "lowest pitch asked for"),
+    ("theta_max", "rad", "highest pitch asked for"),
+    ("alpha_margin", "rad", "distance kept from the advised alpha limit"),
+    ("airspeed_margin", "m/s", "distance kept from the advised airspeed limit"),
+    ("bank_max", "rad", "largest bank asked for"),
+    ("bank_rate", "rad/s", "slew rate of the bank command"),
+    ("elevator_min", "rad", "elevator limit, trailing edge up"),
+    ("elevator_max", "rad", "elevator limit, trailing edge down"),
+    ("aileron_max", "rad", "aileron limit, both ways"),
+    ("rudder_max", "rad", "rudder limit, both ways"),
+    ("throttle_min", "0..1", "flight idle"),
+    ("throttle_max", "0..1", "largest power lever"),
+]
+TARGET = structured(TARGET_FIELDS)
+AUTOPILOT = structured(AUTOPILOT_FIELDS)
+GAINS = structured(GAINS_FIELDS)
+
+
+def load_gains(name: str | Path = "autopilot") -> NDArray:
+    """Gains of the autopilot, one row of GAINS. Raises InputError for a file that does not fit."""
+    return read_parameters(name, GAINS_FIELDS)
+
+
+def init(n: int) -> NDArray:
+    """Autopilots of `n` aircraft, not yet engaged (AUTOPILOT rows)."""
+    return np.zeros(n, AUTOPILOT)
+
+
+@kernel
+def engage(a, m) -> None:
+    """Start every integrator where the controls are, so that engaging moves nothing."""
+    a.engaged = 1.0
+    a.altitude = m.altitude
+    a.climb_rate = airspeed_of(m)*math.sin(m.theta - m.alpha*math.cos(m.phi))
+    a.pitch_trim = m.theta
+    a.elevator_trim = m.elevator
+    a.throttle_trim = 0.5*(m.throttle_left + m.throttle_right)
+    a.bank_command = m.phi
+    a.aileron_trim = m.aileron
+    a.rudder_trim = m.rudder
+
+
+@kernel
+def vertical_speed(a, m, g, dt: float) -> None:
+    """Baro-inertial filter: integrates the vertical acceleration and is corrected by the pressure altitude."""
+    w = g.vertical_bandwidth
+    cos_theta = math.cos(m.theta)
+    up = m.ax*math.sin(m.theta) - (m.ay*math.sin(m.phi) + m.az*math.cos(m.phi))*cos_theta - G0
+    error = m.altitude - a.altitude
+    a.altitude += dt*(a.climb_rate + 2.0*g.vertical_damping*w*error)
+    a.climb_rate += dt*(up + w*w*error)
+
+
+@kernel
+def climb_command(a, m, t, adv, g) -> float:
+    """Climb rate asked for [m/s]; it yields where the airspeed nears its limit."""
+    wanted = t.climb_rate
+    if t.pitch_mode == 1.0:
+        wanted = g.K_altitude*(t.altitude - a.altitude)
+    spare = g.K_speed_priority*(m.airspeed - adv.airspeed_limit - g.airspeed_margin)
+    return clip(min(wanted, spare), -g.climb_max, g.climb_max)
+
+
+@kernel
+def pitch_command(a, m, t, adv, g, climb: float, scale: float, dt: float) -> float:
+    """Pitch angle asked for [rad], limited by the advised angle of attack."""
+    low, high = g.theta_min, g.theta_max
+    ceiling = clip(m.theta + adv.alpha_limit - g.alpha_margin - m.alpha, low, high)
+    if t.pitch_mode == 0.0:
+        a.pitch_trim = m.theta
+        return clip(t.theta, low, ceiling)
+    error = (climb - a.climb_rate)/airspeed_of(m)
+    load = 1.0/max(math.cos(m.phi), 0.5) - 1.0
+    wanted = a.pitch_trim + g.K_climb*error + g.K_turn*scale*load
+    a.pitch_trim = integrated(a.pitch_trim, g.K_climb_integral*error*dt, wanted, low, ceiling)
+    return clip(wanted, low, ceiling)
+
+
+@kernel
+def hold_pitch(a, c, m, adv, g, theta: float, scale: float, dt: float) -> None:
+    """Elevator that holds a pitch angle; its integrator does not pull against the protection."""
+    q_turn = G0/airspeed_of(m)*math.sin(m.phi)*math.tan(clip(m.phi, -1.3, 1.3))
+    error = m.theta - theta
+    wanted = a.elevator_trim + scale*(g.K_theta*error + g.K_q*(m.q - q_turn))
+    rate = scale*g.K_theta_integral*error*dt
+    if adv.intervention > 0.0:
+        rate = max(rate, 0.0)
+    a.elevator_trim = integrated(a.elevator_trim, rate, wanted, g.elevator_min, g.elevator_max)
+    c.elevator = clip(wanted, g.elevator_min, g.elevator_max)
+
+
+@kernel
+def hold_airspeed(a, c, m, t, adv, g, climb: float, dt: float) -> None:
+    """Both power levers."""
+    wanted = t.throttle
+    if t.speed_mode == 1.0:
+        error = max(t.airspeed, adv.airspeed_limit + g.airspeed_margin) - m.airspeed
+        wanted = a.throttle_trim + g.K_airspeed*error + g.K_throttle_climb*climb
+        rate = g.K_airspeed_integral*error*dt
+        a.throttle_trim = integrated(a.throttle_trim, rate, wanted, g.throttle_min, g.throttle_max)
+    else:
+        a.throttle_trim = t.throttle
+    c.throttle_left = c.throttle_right = clip(wanted, g.throttle_min, g.throttle_max)
+
+
+@kernel
+def hold_bank(a, c, m, t, adv, g, scale: float, dt: float) -> None:
+    """Aileron that holds a bank angle or, through it, a heading."""
+    wanted = t.phi
+    if t.roll_mode == 1.0:
+        wanted = math.atan(airspeed_of(m)*g.K_heading*wrapped(t.heading - m.psi)/G0)
+    limit = max(min(g.bank_max, adv.bank_limit), 0.0)
+    step = g.bank_rate*dt
+    a.bank_command += clip(clip(wanted, -limit, limit) - a.bank_command, -step, step)
+    error = m.phi - a.bank_command
+    wanted = a.aileron_trim + scale*(g.K_phi*error + g.K_p*m.p)
+    rate = scale*g.K_phi_integral*error*dt
+    a.aileron_trim = integrated(a.aileron_trim, rate, wanted, -g.aileron_max, g.aileron_max)
+    c.aileron = clip(wanted, -g.aileron_max, g.aileron_max)
+
+
+@kernel
+def damp_yaw(a, c, m, g, scale: float, dt: float) -> None:
+    """Rudder: damps the yaw rate beyond that of a coordinated turn and slowly centres the ball."""
+    r_turn = G0/airspeed_of(m)*math.sin(m.phi)*math.cos(m.theta)
+    wanted = a.rudder_trim + scale*g.K_r*(m.r - r_turn)
+    rate = scale*g.K_ay_integral*m.ay*dt
+    a.rudder_trim = integrated(a.rudder_trim, rate, wanted, -g.rudder_max, g.rudder_max)
+    c.rudder = clip(wanted, -g.rudder_max, g.rudder_max)
+
+
+@entry
+def step(autopilot, command, measurement, target, advisory, gains, dt):  # type: ignore[no-untyped-def]
+    """One step of every autopilot, in place.
+
+    Args:
+        autopilot: AUTOPILOT rows, one per aircraft; changed.
+        command: COMMAND rows; surfaces, power levers and flap are written, ice protection is left alone.
+        measurement: MEASUREMENT rows.
+        target: TARGET rows.
+        advisory: ADVISORY rows.
+        gains: one GAINS row for all, or one per aircraft.
+        dt: time since the last step [s].
+    """
+    for i in range(len(command)):
+        a, c, m, t, adv = autopilot[i], command[i], measurement[i], target[i], advisory[i]
+        g = gains[i if len(gains) > 1 else 0]
+        if a.engaged == 0.0:
+            engage(a, m)
+        qbar = 0.5*air_density(m)*airspeed_of(m)*airspeed_of(m)
+        scale = clip(g.qbar_reference/qbar, g.scale_min, g.scale_max)
+        vertical_speed(a, m, g, dt)
+        climb = 0.0 if t.pitch_mode == 0.0 else climb_command(a, m, t, adv, g)
+        theta = pitch_command(a, m, t, adv, g, climb, scale, dt)
+        hold_pitch(a, c, m, adv, g, theta, scale, dt)
+        hold_airspeed(a, c, m, t, adv, g, climb, dt)
+        hold_bank(a, c, m, t, adv, g, scale, dt)
+        damp_yaw(a, c, m, g, scale, dt)
+        c.flap = max(min(t.flap, adv.flap_limit), 0.0)
