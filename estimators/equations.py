@@ -1,0 +1,134 @@
+"""The equations that equation error fits: what stands on the left, what on the right, and when it can be told.
+
+Structures: Klein & Morelli, Aircraft System Identification (AIAA 2006), examples 5.1 and 5.2, and for drag the
+parabolic polar CD = CD_0 + CD_K CL^2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.estimate import Estimate
+from estimators.regression import Fit, correlation, least_squares
+from icing_env.record import FloatArray
+
+EXCITED = np.radians(0.25)  # rms of a surface about its trend below which it has not moved (assumed)
+LARGEST_CORRELATION = 0.9  # Klein & Morelli, section 5.5
+LARGEST_RATIO = 1.0 / 3.0  # standard error over estimate; beyond it the parameter is dropped
+
+
+@dataclass(frozen=True)
+class Equation:
+    """`target` = sum of derivative x regressor + bias. `optional` regressors stay only where they are seen."""
+
+    target: str
+    regressors: tuple[str, ...]
+    optional: tuple[str, ...] = ()
+    axis: str = "longitudinal"
+
+
+PITCH = ("alpha", "q_hat", "elevator")
+LATERAL = ("beta", "p_hat", "r_hat", "aileron", "rudder")
+EQUATIONS = (
+    Equation("CZ", PITCH),
+    Equation("CL", PITCH),
+    Equation("Cm", PITCH),
+    Equation("CD", ("CL2",)),
+    Equation("CX", ("alpha", "alpha2")),
+    Equation("CY", ("beta", "p_hat", "r_hat", "rudder"), optional=("p_hat",), axis="lateral"),
+    Equation("Cl", LATERAL, axis="lateral"),
+    Equation("Cn", LATERAL, axis="lateral"),
+)
+SURFACES = {"longitudinal": ("elevator",), "lateral": ("aileron", "rudder")}
+NEEDED = {
+    "longitudinal": ("airspeed", "alpha", "q", "az", "elevator"),
+    "lateral": ("airspeed", "beta", "p", "r", "ay", "aileron", "rudder"),
+}
+SUFFIX = {"p_hat": "p", "q_hat": "q", "r_hat": "r", "CL2": "K"}
+UNIT = {"alpha2": "1/rad2", "CL2": "1"}
+
+
+def name_of(target: str, regressor: str) -> str:
+    """Name of the derivative of `target` by `regressor`."""
+    return f"{target}_{SUFFIX.get(regressor, regressor)}"
+
+
+def movement(time: FloatArray, surface: FloatArray, good: NDArray[np.bool_]) -> float:
+    """Root mean square of a surface (rad) about its straight-line trend."""
+    t, x = time[good] - time[0], surface[good]
+    if len(t) < 3:
+        return 0.0
+    return float(np.std(x - np.polyval(np.polyfit(t, x, 1), t)))
+
+
+def fit_equation(
+    equation: Equation, data: dict[str, FloatArray], good: NDArray[np.bool_], moved: dict[str, float], method: str
+) -> dict[str, Estimate]:
+    """Fit one equation on the good rows and judge each of its derivatives."""
+    names = tuple(name for name in equation.regressors if name not in equation.optional)
+    full = _fit(equation.target, equation.regressors, data, good)
+    extra = {n: _judge(equation, n, equation.regressors, full, data, good, moved, method) for n in equation.optional}
+    seen = tuple(name for name in equation.optional if extra[name].identifiable)
+    kept = tuple(name for name in equation.regressors if name in names or name in seen)
+    fit = full if kept == equation.regressors else _fit(equation.target, kept, data, good)
+    result = {name_of(equation.target, n): _judge(equation, n, kept, fit, data, good, moved, method) for n in kept}
+    result.update({name_of(equation.target, n): extra[n] for n in equation.optional if n not in kept})
+    why = _why_axis(equation, moved)
+    bias = Estimate(float(fit.theta[-1]), float(fit.std_error[-1]), "1", method, fit.r2, not why, why)
+    return {**result, f"{equation.target}_0": bias}
+
+
+def _fit(target: str, names: tuple[str, ...], data: dict[str, FloatArray], good: NDArray[np.bool_]) -> Fit:
+    matrix = np.column_stack([*(data[name] for name in names), np.ones(len(good))])
+    matrix[~good] = 0.0
+    return least_squares(matrix, np.where(good, data[target], 0.0))
+
+
+def _judge(
+    equation: Equation,
+    name: str,
+    names: tuple[str, ...],
+    fit: Fit,
+    data: dict[str, FloatArray],
+    good: NDArray[np.bool_],
+    moved: dict[str, float],
+    method: str,
+) -> Estimate:
+    """One derivative with its standard error, and whether the record shows it."""
+    i = names.index(name)
+    value, error = float(fit.theta[i]), float(fit.std_error[i])
+    why = _why_axis(equation, moved) or _why_surface(name, moved) or _why_together(name, names, data, good)
+    if not why and not fit.full_rank:
+        why = "the record does not tell it from the other terms of its equation"
+    if not why and not error <= LARGEST_RATIO * abs(value):
+        why = f"its standard error {error:.2g} exceeds a third of the estimate {value:.2g}"
+    return Estimate(value, error, UNIT.get(name, "1/rad"), method, fit.r2, not why, why)
+
+
+def _why_axis(equation: Equation, moved: dict[str, float]) -> str:
+    surfaces = SURFACES[equation.axis]
+    if max(moved.get(s, 0.0) for s in surfaces) >= EXCITED:
+        return ""
+    told = ", ".join(f"{s} moved {np.degrees(moved.get(s, 0.0)):.2f} deg rms" for s in surfaces)
+    return f"no {equation.axis} manoeuvre: {told}, at least {np.degrees(EXCITED):.2f} is needed"
+
+
+def _why_surface(name: str, moved: dict[str, float]) -> str:
+    if name not in moved or moved[name] >= EXCITED:
+        return ""
+    return f"{name} moved {np.degrees(moved[name]):.2f} deg rms, at least {np.degrees(EXCITED):.2f} is needed"
+
+
+def _why_together(name: str, names: tuple[str, ...], data: dict[str, FloatArray], good: NDArray[np.bool_]) -> str:
+    if len(names) < 2 or "alpha2" in names:  # a power moves with its base by definition; its standard error says it
+        return ""
+    matrix = correlation(np.column_stack([data[n][good] for n in names]))
+    row = np.abs(matrix[names.index(name)])
+    row[names.index(name)] = 0.0
+    other = int(np.argmax(row))
+    if row[other] <= LARGEST_CORRELATION:
+        return ""
+    return f"{name} and {names[other]} move together (correlation {row[other]:.2f}); only their sum is known"
