@@ -1,7 +1,7 @@
 """A classical autopilot: pitch, altitude, climb-rate and airspeed holds; bank and heading holds; yaw damper.
 
-Successive loop closure (McRuer, Ashkenas & Graham, Aircraft Dynamics and Automatic Control, chapters 7-8; Stevens, Lewis
-& Johnson, Aircraft Control and Simulation, 3rd ed., section 4.6), with the structure of the pitch and roll attitude
+Successive loop closure (McRuer, Ashkenas & Graham, Aircraft Dynamics and Automatic Control, chapters 7-8; Stevens,
+Lewis & Johnson, Aircraft Control and Simulation, 3rd ed., section 4.6), with the structure of the pitch and roll attitude
 holds of the Smart Icing Systems autopilot. Signs: positive elevator pitches down, positive aileron rolls left,
 positive rudder yaws left; so too little pitch gives negative elevator, too little bank negative aileron.
 

@@ -1,11 +1,11 @@
 """Envelope protection between any controller and the actuators: angle of attack, airspeed, bank, flap.
 
-One law for each: the angle or speed is predicted a little ahead from its measured rate, and the surface may not go beyond
-the deflection that would bring the prediction to its limit. Far inside, the command passes bit by bit; near the limit the
-corner is rounded; beyond it the surface follows the law alone. The elevator is only ever moved nose-down.
+One law for each: the angle or speed is predicted a little ahead from its measured rate, and the surface may not go
+beyond the deflection that would bring the prediction to its limit. Far inside, the command passes bit by bit; near the
+limit the corner is rounded; beyond it the surface follows the law alone. The elevator is only ever moved nose-down.
 
-* alpha: elevator >= trim(alpha_limit) + K_alpha (alpha + lead alpha_rate - alpha_limit), where trim is the elevator that
-  balances the pitching moment at the limit, -(Cm_0 + Cm_alpha alpha_limit + Cm_flap flap)/Cm_elevator
+* alpha: elevator >= trim(alpha_limit) + K_alpha (alpha + lead alpha_rate - alpha_limit), where trim is the elevator
+  that balances the pitching moment at the limit, -(Cm_0 + Cm_alpha alpha_limit + Cm_flap flap)/Cm_elevator
 * airspeed: below airspeed_limit, predicted by its measured rate, nose-down elevator and power in proportion
 * bank: aileron >= K_phi (phi + lead p - bank_limit) on the right, mirrored on the left
 * flap <= flap_limit

@@ -105,7 +105,7 @@ def assess(e, frame, g) -> tuple:
 
 @kernel
 def characterise(a, e, frame, g, dt: float) -> None:
-    """Severity, confidence and detection. An unhealthy or undefined estimate leaves all but the confidence as it was."""
+    """Severity, confidence and detection. An unhealthy or undefined estimate changes the confidence only."""
     severity, confidence = assess(e, frame, g)
     if e.health != 1.0 or not (math.isfinite(severity) and math.isfinite(confidence)):
         a.confidence = 0.0
@@ -183,7 +183,7 @@ def step(advisory, estimate, measurement, airframe, tuning, dt):  # type: ignore
 
 @entry
 def operate(command, advisory):  # type: ignore[no-untyped-def]
-    """Switch on in the command (COMMAND rows) the ice protection that the advisory asks for; nothing is switched off."""
+    """Switch on in COMMAND rows the ice protection that the ADVISORY rows ask for; nothing is switched off."""
     for i in range(len(command)):
         c, a = command[i], advisory[i]
         c.boots_wing = max(c.boots_wing, a.boots_wing)
