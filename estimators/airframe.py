@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 
+from icing_env.configuration import read_toml
 from icing_env.errors import InputError
 from icing_env.types import DERIVATIVE_NAMES, Field, structured
 
@@ -22,18 +24,10 @@ AIRFRAME_FIELDS: list[Field] = [
 ]
 AIRFRAME = structured(AIRFRAME_FIELDS)
 
-# Published clean set (UIUC/FDC: FGDATA Aircraft-uiuc/TwinOtter/aircraft.dat), per rad; geometry, mass and
-# inertia as the NASA record 020214f1 states them (422.4835 ft2, 64.9934 ft, 6.4961 ft, 339.3 slug, ...).
-TWIN_OTTER: dict[str, float] = {
-    "wing_area": 39.25, "span": 19.81, "chord": 1.98, "mass": 4952.0,
-    "inertia_xx": 28345.0, "inertia_yy": 32900.0, "inertia_zz": 52165.0, "inertia_xz": 1528.0,
-    "CX_0": -0.0488, "CX_alpha": 0.223, "CX_alpha2": 1.659,
-    "CZ_0": -0.360, "CZ_alpha": -5.660, "CZ_q": -19.97, "CZ_elevator": -0.608,
-    "Cm_0": 0.040, "Cm_alpha": -1.310, "Cm_q": -34.2, "Cm_elevator": -1.740,
-    "CY_beta": -0.6, "CY_p": -0.2, "CY_r": 0.4, "CY_rudder": 0.15,
-    "Cl_beta": -0.08, "Cl_p": -0.5, "Cl_r": 0.06, "Cl_aileron": -0.15, "Cl_rudder": 0.015,
-    "Cn_beta": 0.1, "Cn_p": -0.06, "Cn_r": -0.18, "Cn_aileron": -0.001, "Cn_rudder": -0.125,
-}  # fmt: skip
+def published_airframe(aircraft: str | Path = "twin_otter") -> np.ndarray:
+    """The clean airframe as `configs/aircraft` states it, with the sources there (`AIRFRAME` array of one row)."""
+    sections = [entries for entries in read_toml("aircraft", aircraft).values() if isinstance(entries, dict)]
+    return airframe_from({name: entry["value"] for entries in sections for name, entry in entries.items()})
 
 
 def airframe_from(parameters: np.ndarray | Mapping[str, float]) -> np.ndarray:

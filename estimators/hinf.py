@@ -18,34 +18,31 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import literal_unroll
 
 from estimators.airframe import airframe_from
 from estimators.hinf_channel import filter_step, forget, learn
 from estimators.hinf_excitation import excite, gate, shares
-from estimators.hinf_rows import clean_zero_lift_drag, force_rows, moment_rows, readable
+from estimators.hinf_rows import PARAMETER_NAMES, clean_zero_lift_drag, force_rows, moment_rows, readable
 from icing_env.jit import entry, kernel
-from icing_env.types import ESTIMATED_NAMES
 
-STD_NAMES = tuple(f"{name}_std" for name in ESTIMATED_NAMES)
-
-# First parameter and number of parameters of each channel in ESTIMATED_NAMES, first element in the packed B3.
-FIRST = (0, 1, 4, 8, 12, 18)
-COUNT = (1, 3, 4, 4, 6, 6)
-PACKED = (0, 1, 7, 17, 27, 48)
+# First parameter and number of parameters of each channel in PARAMETER_NAMES, first element of its packed B3.
+FIRST = (0, 1, 5, 9, 14, 20)
+COUNT = (1, 4, 4, 5, 6, 6)
+PACKED = (0, 1, 11, 21, 36, 57)
+ACCELEROMETER = (0, 1, -1, 2, -1, -1)  # which accelerometer serves the channel
 DIAGONAL = tuple(PACKED[c] + i * (i + 1) // 2 + i for c in range(6) for i in range(COUNT[c]))
 
 OBSERVER = np.dtype([
-    ("theta", "f8", (24,)),  # estimates, in the order of ESTIMATED_NAMES
-    ("b3", "f8", (69,)),  # their covariance: lower triangles of the six channels
-    ("scale", "f8", (24,)),  # size of each parameter, for q0 and k0
-    ("filtered", "f8", (24,)),  # f, the regressors behind the observer's filter
+    ("theta", "f8", (26,)),  # estimates, in the order of PARAMETER_NAMES
+    ("b3", "f8", (78,)),  # their covariance: lower triangles of the six channels
+    ("scale", "f8", (26,)),  # size of each parameter, for q0 and k0
+    ("filtered", "f8", (26,)),  # f, the regressors behind the observer's filter
     ("zeta", "f8", (6,)),  # the rest of the dynamics behind the same filter
-    ("row", "f8", (24,)), ("row_before", "f8", (24,)),  # regressors now and a sample ago
+    ("row", "f8", (26,)), ("row_before", "f8", (26,)),  # regressors now and a sample ago
     ("rest", "f8", (6,)), ("rest_before", "f8", (6,)),  # b now and a sample ago
     ("y", "f8", (6,)), ("y_before", "f8", (6,)),  # measured states now and a sample ago
     ("accelerometer", "f8", (3,)), ("factor", "f8", (3,)),  # see hinf_rows
-    ("gain", "f8", (6,)),  # scratch
+    ("gain", "f8", (6,)), ("deviation", "f8", (26,)),  # scratch; standard errors
     ("mean", "f8", (7,)), ("energy", "f8", (5,)),  # of the excitation measures
     ("excess_drag", "f8"),
     ("seated", "f8"),  # 0: the next readable sample starts the filters
@@ -54,17 +51,18 @@ OBSERVER = np.dtype([
 
 
 def clean_values(airframe: np.ndarray) -> np.ndarray:
-    """Coefficients of the clean aircraft in the order of ESTIMATED_NAMES, shape (rows, 24).
+    """Coefficients of the clean aircraft in the order of PARAMETER_NAMES, shape (rows, 26).
 
     From the body-axis set: CL_0 = -CZ_0, CL_alpha = CX_0 - CZ_alpha (slope at alpha = 0), CL_elevator = -CZ_elevator.
     """
     af = airframe_from(airframe)
     alpha = af["CZ_0"] / (af["CX_0"] - af["CZ_alpha"])
     drag = -(af["CX_0"] + alpha * (af["CX_alpha"] + alpha * af["CX_alpha2"])) / np.cos(alpha)
-    own = {"CD_0": drag, "CL_0": -af["CZ_0"], "CL_alpha": af["CX_0"] - af["CZ_alpha"], "CL_elevator": -af["CZ_elevator"]}
+    own = {"CD_0": drag, "CL_0": -af["CZ_0"], "CL_alpha": af["CX_0"] - af["CZ_alpha"], "CL_elevator": -af["CZ_elevator"],
+           "CL_q": -af["CZ_q"]}
     zero = np.zeros(len(af))
     names = af.dtype.names or ()
-    return np.stack([own.get(n, af[n] if n in names else zero) for n in ESTIMATED_NAMES], axis=1)
+    return np.stack([own.get(n, af[n] if n in names else zero) for n in PARAMETER_NAMES], axis=1)
 
 
 def init(parameters: np.ndarray, tuning: np.ndarray, n: int, start: float = 1.0) -> np.ndarray:
@@ -98,7 +96,7 @@ def advance_filters(ob, tn, dt):  # type: ignore[no-untyped-def]
 @kernel
 def remember(ob, seat):  # type: ignore[no-untyped-def]
     """Keep this sample's rows; with `seat`, start the filters here: xhat = y, nothing filtered yet."""
-    for i in range(24):
+    for i in range(26):
         ob["row_before"][i] = ob["row"][i]
         if seat:
             ob["filtered"][i] = 0.0
@@ -109,35 +107,32 @@ def remember(ob, seat):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def learn_channel(ob, tn, channel, accelerometer, information, wander, wander_first, kappa):  # type: ignore[no-untyped-def]
-    """One sample of one channel: state row, accelerometer row (its index, or -1), wandering. False at a failure."""
-    first, packed, m = FIRST[channel], PACKED[channel], COUNT[channel]
-    theta, b3, gain = ob["theta"], ob["b3"], ob["gain"]
-    n = tn["n"][channel]
-    good = learn(theta, b3, gain, first, packed, m, ob["filtered"], 1.0,
-                 ob["y"][channel] - ob["zeta"][channel], information / (n * n), kappa)
-    if accelerometer >= 0:
-        n = tn["accelerometer"][accelerometer]
-        good = learn(theta, b3, gain, first, packed, m, ob["row"], ob["factor"][accelerometer],
-                     ob["accelerometer"][accelerometer], information / (n * n), kappa) and good
-    k0 = tn["k0"][channel]
-    forget(b3, ob["scale"], first, packed, m, k0 * wander, k0 * wander_first, tn["q0"][channel])
-    return good
-
-
-@kernel
 def learn_all(ob, tn, longitudinal, lateral, lively, dt):  # type: ignore[no-untyped-def]
-    """All six channels over one sample. Gated channels take in, and wander, only as far as they are excited."""
+    """All six channels over one sample: state row, accelerometer row, wandering. False if any of them failed.
+
+    Gated channels take data in, and wander, only as far as they are excited.
+    """
+    theta, b3, gain = ob["theta"], ob["b3"], ob["gain"]
     kappa = 1.0 - 1.0 / (tn["gamma"] * tn["gamma"])
     pitching = dt * gate(longitudinal, tn["share_low"], tn["share_high"])
     turning = dt * gate(lateral, tn["share_low"], tn["share_high"])
     lifting = dt * (lively if tn["share_high"] > 0.0 else 1.0)
-    good = learn_channel(ob, tn, 0, 0, dt, dt, dt, kappa)
-    good = learn_channel(ob, tn, 1, 1, dt, lifting, dt, kappa) and good
-    good = learn_channel(ob, tn, 2, -1, pitching, pitching, pitching, kappa) and good
-    good = learn_channel(ob, tn, 3, 2, turning, turning, turning, kappa) and good
-    good = learn_channel(ob, tn, 4, -1, turning, turning, turning, kappa) and good
-    return learn_channel(ob, tn, 5, -1, turning, turning, turning, kappa) and good
+    heard = (dt, dt, pitching, turning, turning, turning)
+    wander = (dt, lifting, pitching, turning, turning, turning)
+    good = True
+    for c in range(6):
+        first, packed, m = FIRST[c], PACKED[c], COUNT[c]
+        target = ob["y"][c] - ob["zeta"][c]
+        information = heard[c] / (tn["n"][c] * tn["n"][c])
+        good &= learn(theta, b3, gain, first, packed, m, ob["filtered"], 1.0, target, information, kappa)
+        if ACCELEROMETER[c] >= 0:
+            a = ACCELEROMETER[c]
+            target, factor = ob["accelerometer"][a], ob["factor"][a]
+            information = heard[c] / (tn["accelerometer"][a] * tn["accelerometer"][a])
+            good &= learn(theta, b3, gain, first, packed, m, ob["row"], factor, target, information, kappa)
+        k0 = tn["k0"][c]
+        forget(b3, ob["scale"], first, packed, m, k0 * wander[c], k0 * heard[c], tn["q0"][c])
+    return good
 
 
 @kernel
@@ -155,15 +150,30 @@ def healthy(ob) -> bool:  # type: ignore[no-untyped-def]
 
 @kernel
 def report(ob, est, longitudinal, lateral):  # type: ignore[no-untyped-def]
-    """Write estimates, standard errors, excess drag and excitation; health is 1."""
-    i = 0
-    for name in literal_unroll(ESTIMATED_NAMES):
-        est[name] = ob["theta"][i]
-        i += 1
-    i = 0
-    for name in literal_unroll(STD_NAMES):
-        est[name] = math.sqrt(ob["b3"][DIAGONAL[i]])
-        i += 1
+    """Write estimates, standard errors, excess drag and excitation; health is 1. Order: PARAMETER_NAMES."""
+    th, sd = ob["theta"], ob["deviation"]
+    for i in range(26):
+        sd[i] = math.sqrt(ob["b3"][DIAGONAL[i]])
+    est["CD_0"], est["CL_0"], est["CL_alpha"] = th[0], th[1], th[2]
+    est["CL_elevator"], est["Cm_0"], est["Cm_alpha"] = th[4], th[5], th[6]
+    est["Cm_q"], est["Cm_elevator"], est["CY_0"] = th[7], th[8], th[9]
+    est["CY_beta"], est["CY_r"], est["CY_rudder"] = th[10], th[12], th[13]
+    est["Cl_0"], est["Cl_beta"], est["Cl_p"] = th[14], th[15], th[16]
+    est["Cl_r"], est["Cl_aileron"], est["Cl_rudder"] = th[17], th[18], th[19]
+    est["Cn_0"], est["Cn_beta"], est["Cn_p"] = th[20], th[21], th[22]
+    est["Cn_r"], est["Cn_aileron"], est["Cn_rudder"] = th[23], th[24], th[25]
+    est["CD_0_std"], est["CL_0_std"] = sd[0], sd[1]
+    est["CL_alpha_std"], est["CL_elevator_std"] = sd[2], sd[4]
+    est["Cm_0_std"], est["Cm_alpha_std"] = sd[5], sd[6]
+    est["Cm_q_std"], est["Cm_elevator_std"] = sd[7], sd[8]
+    est["CY_0_std"], est["CY_beta_std"] = sd[9], sd[10]
+    est["CY_r_std"], est["CY_rudder_std"] = sd[12], sd[13]
+    est["Cl_0_std"], est["Cl_beta_std"] = sd[14], sd[15]
+    est["Cl_p_std"], est["Cl_r_std"] = sd[16], sd[17]
+    est["Cl_aileron_std"], est["Cl_rudder_std"] = sd[18], sd[19]
+    est["Cn_0_std"], est["Cn_beta_std"] = sd[20], sd[21]
+    est["Cn_p_std"], est["Cn_r_std"] = sd[22], sd[23]
+    est["Cn_aileron_std"], est["Cn_rudder_std"] = sd[24], sd[25]
     est["excess_drag"] = ob["excess_drag"]
     est["excitation_longitudinal"], est["excitation_lateral"] = longitudinal, lateral
     est["health"] = 1.0

@@ -69,7 +69,7 @@ def learn(theta, b3, gain, first, packed, m, row, factor, target, information, k
     With r held and `information` = dt/n^2, the equations Bdot = -kappa B r r'B/n^2 and
     thetahatdot = B r (target - r'thetahat)/n^2 keep the direction g = B r and give, with s = information r'g,
         B <- B - kappa information/(1 + kappa s) g g',    thetahat <- thetahat + g e/(r'g) (1 - shrink(s)).
-    theta, row: (24,); b3: (69,) lower triangles; gain: (6,) scratch. Returns False at a finite escape
+    theta, row: (26,); b3: (78,) lower triangles; gain: (6,) scratch. Returns False at a finite escape
     (1 + kappa s <= 0, only for gamma < 1) or when B3 is no longer positive, leaving theta and B3 as they were.
     """
     along, residual = 0.0, target

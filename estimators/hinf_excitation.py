@@ -26,12 +26,12 @@ def excite(ob, m, af, window, dt):  # type: ignore[no-untyped-def]
     """
     row = ob["row"]
     weight = min(1.0, dt / window) if ob["seated"] > 0.0 else 1.0
-    elevator = activity(ob, 0, weight, row[7] * af["Cm_elevator"])
-    pitching = activity(ob, 1, weight, row[5] * af["Cm_alpha"] + row[6] * af["Cm_q"])
-    surfaces = activity(ob, 2, weight, row[16] * af["Cl_aileron"] + row[17] * af["Cl_rudder"])
-    surfaces += activity(ob, 3, weight, row[22] * af["Cn_aileron"] + row[23] * af["Cn_rudder"])
-    motion = activity(ob, 4, weight, row[13] * af["Cl_beta"] + row[14] * af["Cl_p"] + row[15] * af["Cl_r"])
-    motion += activity(ob, 5, weight, row[19] * af["Cn_beta"] + row[20] * af["Cn_p"] + row[21] * af["Cn_r"])
+    elevator = activity(ob, 0, weight, row[8] * af["Cm_elevator"])
+    pitching = activity(ob, 1, weight, row[6] * af["Cm_alpha"] + row[7] * af["Cm_q"])
+    surfaces = activity(ob, 2, weight, row[18] * af["Cl_aileron"] + row[19] * af["Cl_rudder"])
+    surfaces += activity(ob, 3, weight, row[24] * af["Cn_aileron"] + row[25] * af["Cn_rudder"])
+    motion = activity(ob, 4, weight, row[15] * af["Cl_beta"] + row[16] * af["Cl_p"] + row[17] * af["Cl_r"])
+    motion += activity(ob, 5, weight, row[21] * af["Cn_beta"] + row[22] * af["Cn_p"] + row[23] * af["Cn_r"])
     alpha = activity(ob, 6, weight, m["alpha"])
     energy = ob["energy"]
     energy[0] += weight * (elevator - energy[0])
@@ -52,8 +52,8 @@ def shares(ob, tn, af):  # type: ignore[no-untyped-def]
     """Excitation shares (longitudinal, lateral) and the liveliness of alpha (0..1), from the energies."""
     energy = ob["energy"]
     floor = tn["control_floor"]
-    elevator_noise = ob["row"][4] * af["Cm_elevator"] * floor
-    aileron_noise = ob["row"][12] * af["Cl_aileron"] * floor
+    elevator_noise = ob["row"][5] * af["Cm_elevator"] * floor
+    aileron_noise = ob["row"][14] * af["Cl_aileron"] * floor
     longitudinal = energy[0] / (energy[0] + energy[1] + elevator_noise * elevator_noise)
     lateral = energy[2] / (energy[2] + energy[3] + aileron_noise * aileron_noise)
     return longitudinal, lateral, energy[4] / (energy[4] + tn["alpha_floor"] * tn["alpha_floor"])

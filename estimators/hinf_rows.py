@@ -2,7 +2,7 @@
 
 Standard rigid-body equations (Klein and Morelli, Aircraft System Identification, chapter 3), Ixz = + int x z dm.
 Everything that is not an estimated coefficient is formed from measured quantities and goes into b.
-`rows` leaves, in the order of ESTIMATED_NAMES, the regressors a of the six state equations in row["row"], the rest
+They leave, in the order of PARAMETER_NAMES, the regressors a of the six state equations in row["row"], the rest
 in row["rest"], the states as measured in row["y"], and for drag, lift and side force what the accelerometer says
 (row["accelerometer"]) with the factor by which the same regressors enter it (row["factor"]).
 """
@@ -16,6 +16,16 @@ from icing_env.jit import kernel
 GRAVITY = 9.80665  # m/s2, standard
 GAS_CONSTANT = 287.05287  # J/(kg K), 1976 standard atmosphere
 
+# Order of the parameters in the observer's memory, channel by channel. Those of ESTIMATED_NAMES and two more.
+PARAMETER_NAMES = (
+    "CD_0",
+    "CL_0", "CL_alpha", "CL_q", "CL_elevator",
+    "Cm_0", "Cm_alpha", "Cm_q", "Cm_elevator",
+    "CY_0", "CY_beta", "CY_p", "CY_r", "CY_rudder",
+    "Cl_0", "Cl_beta", "Cl_p", "Cl_r", "Cl_aileron", "Cl_rudder",
+    "Cn_0", "Cn_beta", "Cn_p", "Cn_r", "Cn_aileron", "Cn_rudder",
+)  # fmt: skip
+
 
 @kernel
 def clean_zero_lift_drag(af) -> float:  # type: ignore[no-untyped-def]
@@ -28,10 +38,11 @@ def clean_zero_lift_drag(af) -> float:  # type: ignore[no-untyped-def]
 def force_rows(ob, m, af):  # type: ignore[no-untyped-def]
     """Drag, lift and side force: states airspeed, alpha, beta; accelerometers x, z, y.
 
-    Drag:  a_x = k (CX_clean(alpha) - (CD_0 - CD_0,clean) cos alpha) + T/m, k = qbar S/m: the lift-dependent part keeps
-    the clean shape along body x, so that CD_0 is the drag at zero lift with thrust removed.
-    Lift:  k CL = (a_x - T/m) sin alpha - a_z cos alpha; CL_q and the shape of CX a priori.
-    Side:  a_y = k (CY_0 + CY_beta beta + CY_p p^ + CY_r r^ + CY_rudder rudder); CY_p a priori.
+    Drag:  a_x = k (CX_clean(alpha) - (CD_0 - CD_0,clean) cos alpha) + T/m, k = qbar S/m. Lift-dependent drag keeps the
+    clean shape along body x, so that CD_0 is the drag at zero lift with thrust removed.
+    Lift:  k CL = (a_x - T/m) sin alpha - a_z cos alpha.
+    CL = CL_0 + CL_alpha alpha + CL_q q^ + CL_elevator elevator.
+    Side:  a_y = k (CY_0 + CY_beta beta + CY_p p^ + CY_r r^ + CY_rudder rudder).
     """
     row, rest = ob["row"], ob["rest"]
     v, alpha, beta, p, q, r = m["airspeed"], m["alpha"], m["beta"], m["p"], m["q"], m["r"]
@@ -50,19 +61,18 @@ def force_rows(ob, m, af):  # type: ignore[no-untyped-def]
     ob["accelerometer"][0], ob["factor"][0] = m["ax"] - known, 1.0 / (ca * cb)
 
     lift = -k / (v * cb)
-    row[1], row[2], row[3] = lift, lift * alpha, lift * m["elevator"]
-    pitching = k * af["CZ_q"] * half_chord * q
+    row[1], row[2], row[3], row[4] = lift, lift * alpha, lift * half_chord * q, lift * m["elevator"]
     rest[1] = q - sb / cb * (p * ca + r * sa) + (
-        GRAVITY * (sa * st + ca * cp * ct) + pitching - thrust * sa) / (v * cb)
-    ob["accelerometer"][1] = m["az"] * ca - (m["ax"] - thrust) * sa - pitching
+        GRAVITY * (sa * st + ca * cp * ct) - thrust * sa) / (v * cb)
+    ob["accelerometer"][1] = m["az"] * ca - (m["ax"] - thrust) * sa
     ob["factor"][1] = v * cb
 
     side = k * cb / v
-    row[8], row[9], row[10], row[11] = side, side * beta, side * r * half_span, side * m["rudder"]
-    rolling = k * af["CY_p"] * half_span * p
-    rest[3] = p * sa - r * ca + (rolling * cb - sb * (m["ax"] * ca + m["az"] * sa) + GRAVITY * (
+    row[9], row[10], row[11] = side, side * beta, side * half_span * p
+    row[12], row[13] = side * half_span * r, side * m["rudder"]
+    rest[3] = p * sa - r * ca + (-sb * (m["ax"] * ca + m["az"] * sa) + GRAVITY * (
         ca * sb * st + cb * sp * ct - sa * sb * cp * ct)) / v
-    ob["accelerometer"][2], ob["factor"][2] = m["ay"] - rolling, v / cb
+    ob["accelerometer"][2], ob["factor"][2] = m["ay"], v / cb
     ob["y"][0], ob["y"][1], ob["y"][3] = v, alpha, beta
     return qbar
 
@@ -82,10 +92,10 @@ def moment_rows(ob, m, af, qbar):  # type: ignore[no-untyped-def]
     half_span, force = 0.5 * af["span"] / v, qbar * af["wing_area"]
 
     pitch = force * af["chord"] / yy
-    row[4], row[5] = pitch, pitch * m["alpha"]
-    row[6], row[7] = pitch * 0.5 * af["chord"] / v * q, pitch * m["elevator"]
+    row[5], row[6] = pitch, pitch * m["alpha"]
+    row[7], row[8] = pitch * 0.5 * af["chord"] / v * q, pitch * m["elevator"]
     rest[2] = ((zz - xx) * p * r + xz * (r * r - p * p)) / yy
-    for channel, inertia in ((12, xx), (18, zz)):
+    for channel, inertia in ((14, xx), (20, zz)):
         moment = force * af["span"] / inertia
         row[channel], row[channel + 1] = moment, moment * beta
         row[channel + 2], row[channel + 3] = moment * half_span * p, moment * half_span * r

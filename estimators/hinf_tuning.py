@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from functools import cache
 from pathlib import Path
@@ -10,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from icing_env.errors import InputError
-from icing_env.types import ESTIMATED_NAMES
+from estimators.hinf_rows import PARAMETER_NAMES
+from icing_env.configuration import folder
+from icing_env.errors import InputError, nearest
 
 CHANNELS = ("drag", "lift", "pitch", "side", "roll", "yaw")
 _NUMBERS = ("gamma", "window", "share_low", "share_high", "control_floor", "alpha_floor", "drag_smoothing")
@@ -20,16 +20,14 @@ _PER_CHANNEL = ("d", "n", "q0", "k0")
 TUNING = np.dtype(
     [(name, "f8") for name in _NUMBERS]
     + [(name, "f8", (6,)) for name in _PER_CHANNEL]
-    + [("accelerometer", "f8", (3,)), ("smallest_scale", "f8", (24,))]
+    + [("accelerometer", "f8", (3,)), ("smallest_scale", "f8", (26,))]
 )
-DEFAULT_PATH = Path(__file__).resolve().parent.parent / "configs" / "estimators" / "hinf.toml"
 
 
 def _check(keys: Any, known: tuple[str, ...], where: str) -> None:
     for key in keys:
         if key not in known:
-            near = difflib.get_close_matches(key, known, 1)
-            raise InputError(f"{where}: unknown key {key!r}" + (f"; did you mean {near[0]!r}?" if near else ""))
+            raise InputError(f"{where}: unknown key '{key}': {nearest(key, list(known))}")
     missing = [key for key in known if key not in keys]
     if missing:
         raise InputError(f"{where}: key {missing[0]!r} is missing")
@@ -55,15 +53,15 @@ def tuning_from(path: str | Path) -> np.ndarray:
         if "accelerometer" in values:
             tuning["accelerometer"][0, ("drag", "lift", "side").index(channel)] = values["accelerometer"]
     for name, value in table["smallest_scale"].items():
-        if name not in ESTIMATED_NAMES:
-            _check([name], ESTIMATED_NAMES, f"{path} [smallest_scale]")
-        tuning["smallest_scale"][0, ESTIMATED_NAMES.index(name)] = value
+        if name not in PARAMETER_NAMES:
+            _check([name], PARAMETER_NAMES, f"{path} [smallest_scale]")
+        tuning["smallest_scale"][0, PARAMETER_NAMES.index(name)] = value
     return tuning
 
 
 @cache
 def _default() -> np.ndarray:
-    return tuning_from(DEFAULT_PATH)
+    return tuning_from(folder() / "estimators" / "hinf.toml")
 
 
 def default_tuning() -> np.ndarray:
