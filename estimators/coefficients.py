@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from icing_env.atmosphere import GAS_CONSTANT, density
 from icing_env.errors import InputError
@@ -28,7 +29,7 @@ class Airframe:
     geometry: Geometry
 
     @staticmethod
-    def from_parameters(row: Any) -> Airframe:
+    def from_parameters(row: NDArray[Any] | np.void) -> Airframe:
         """From one row of the aircraft's parameters (fields mass, inertia_*, wing_area, span, chord)."""
         row = np.asarray(row).reshape(-1)[0]
         inertia = (row["inertia_xx"], row["inertia_yy"], row["inertia_zz"], row["inertia_xz"])

@@ -153,18 +153,19 @@ def _check_kinematics(record: FlightRecord) -> None:
     zero = np.zeros(len(grid.time))
     phi, theta, r = v.get("phi", zero), v.get("theta", zero), v.get("r", zero)
     if "theta" in v and "q" in v:
-        good = grid.good(("theta", "q"))
-        _judge(where, "q", "theta", slope(theta, grid.dt, half), smooth(v["q"] * np.cos(phi) - r * np.sin(phi), half), good)
+        expected = smooth(v["q"] * np.cos(phi) - r * np.sin(phi), half)
+        _judge(where, "q", "theta", slope(theta, grid.dt, half), expected, grid.good(("theta", "q")))
     if "phi" in v and "p" in v:
         turn = np.tan(theta) * (v.get("q", zero) * np.sin(phi) + r * np.cos(phi))
         _judge(where, "p", "phi", slope(phi, grid.dt, half), smooth(v["p"] + turn, half), grid.good(("phi", "p")))
-    if "alpha" in v and "az" in v and np.max(v["alpha"]) < 0.2:  # below the stall, where lift rises with alpha
-        good = grid.good(("alpha", "az"))
-        gain, match = _line(v["alpha"][good], v["az"][good] / np.median(v["az"]))
+    if all(name in v for name in ("alpha", "az", "airspeed")) and np.max(v["alpha"]) < 0.2:
+        lift = v["az"] / v["airspeed"] ** 2  # per its mean: CL/mean(CL), which rises with alpha below the stall
+        good = grid.good(("alpha", "az", "airspeed"))
+        gain, match = _line(v["alpha"][good], lift[good] / np.mean(lift[good]))
         if match < -0.7:
             raise InputError(f"{where}: column 'alpha' has its sign reversed: lift falls as alpha rises")
         if match > 0.7 and gain < 1.5 and np.std(v["alpha"]) > 0.01:
-            raise InputError(f"{where}: column 'alpha' looks like degrees: lift changes by {gain:.2g} of itself per unit")
+            raise InputError(f"{where}: column 'alpha' looks like degrees: lift grows by {gain:.2g} of itself per unit")
 
 
 def _judge(
@@ -172,11 +173,13 @@ def _judge(
 ) -> None:
     """Compare the change of an angle with the rate that should make it (rad/s, each (N,))."""
     rows = good & np.isfinite(change) & np.isfinite(expected)
-    if rows.sum() < FEWEST or np.std(change[rows]) < 0.005 and np.std(expected[rows]) < 0.005:
+    if rows.sum() < FEWEST or max(np.std(change[rows]), np.std(expected[rows])) < 0.005:
         return
     gain, match = _line(expected[rows], change[rows])
     if match < -0.7:
-        raise InputError(f"{where}: column '{rate}' (or '{angle}') has its sign reversed: {angle} changes at {gain:.2f} {rate}")
+        raise InputError(
+            f"{where}: '{rate}' (or '{angle}') has its sign reversed: {angle} changes at {gain:.2f} {rate}"
+        )
     if match > 0.7 and not 0.2 < gain < 5.0:
         raise InputError(f"{where}: '{angle}' and '{rate}' are not both in rad: {angle} changes at {gain:.3g} {rate}")
 

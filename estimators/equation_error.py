@@ -55,10 +55,8 @@ def identify(record: FlightRecord, mode: str = "matched", default: Airframe | No
         raise InputError(f"record '{record.meta.name}' lacks columns: {lacks}")
     airframe = airframe_of(record, default)
     data, half = _data(grid, airframe) if mode == "matched" else _stored(grid, record, airframe)
-    moved = {
-        s: movement(grid.time, grid.values[s], grid.good((s,))) for pair in SURFACES.values() for s in pair
-        if s in grid.values
-    }  # fmt: skip
+    surfaces = [name for pair in SURFACES.values() for name in pair if name in grid.values]
+    moved = {name: movement(grid.time, grid.values[name], grid.good((name,))) for name in surfaces}
     result: dict[str, Estimate] = {}
     for equation in EQUATIONS:
         if not axes[equation.axis] and equation.target in data:
@@ -82,6 +80,11 @@ def _without_thrust(found: dict[str, Estimate], equation: Equation, known: bool)
         return found
     why = "thrust was not recorded and cannot be told from drag"
     return {n: Estimate(e.estimate, e.std_error, e.unit, e.method, e.r2, False, why) for n, e in found.items()}
+
+
+def _present(values: dict[str, FloatArray], names: tuple[str, ...]) -> dict[str, FloatArray]:
+    """Those of the named channels that are there."""
+    return {name: values[name] for name in names if name in values}
 
 
 def _zeros_for(values: dict[str, FloatArray], names: tuple[str, ...], n: int) -> tuple[FloatArray, ...]:
@@ -108,11 +111,11 @@ def _stored(grid: Grid, record: FlightRecord, airframe: Airframe) -> tuple[dict[
     qbar = dynamic_pressure(values)
     forces = body_forces(values, qbar, airframe)
     if not record.meta.corrected:
-        forces.update({name: values[name] for name in ("CX", "CY", "CZ") if name in values})
+        forces.update(_present(values, ("CX", "CY", "CZ")))
     data = _with_lift(forces, values, n)
-    hats = {**hat_rates(values, airframe), **{k: values[k] for k in ("p_hat", "q_hat", "r_hat") if k in values}}
+    hats = {**hat_rates(values, airframe), **_present(values, ("p_hat", "q_hat", "r_hat"))}
     data.update(_regressors(values, hats, data))
-    stored = {name: values[name] for name in ("Cl", "Cm", "Cn") if name in values}
+    stored = _present(values, ("Cl", "Cm", "Cn"))
     if len(stored) < 3:
         if not all(name in values for name in ("p_dot", "q_dot", "r_dot")):
             raise InputError(f"record '{record.meta.name}' stores no p_dot, q_dot, r_dot: use the mode 'matched'")
@@ -134,8 +137,7 @@ def _regressors(
     values: dict[str, FloatArray], hats: dict[str, FloatArray], forces: dict[str, FloatArray]
 ) -> dict[str, FloatArray]:
     """What may stand on the right of an equation."""
-    found = {name: values[name] for name in ("alpha", "beta", "elevator", "aileron", "rudder") if name in values}
-    found.update(hats)
+    found = {**_present(values, ("alpha", "beta", "elevator", "aileron", "rudder")), **hats}
     if "alpha" in values:
         found["alpha2"] = values["alpha"] ** 2
     if "CL" in forces:

@@ -38,7 +38,8 @@ def common_grid(record: FlightRecord) -> Grid:
     time, dt, problems = record.time, record.dt, list[DataProblem]()
     start, end = float(time[0]), float(time[-1])
     if np.max(np.abs(np.diff(time) - dt)) > IRREGULAR * dt:
-        time = start + dt * np.arange(int(np.floor((end - start) / dt + 1e-6)) + 1)
+        steps = int(np.floor((end - start) / dt + 1e-6))
+        time = np.linspace(start, start + steps * dt, steps + 1, dtype=np.float64)
         problems.append(DataProblem("time", f"irregular, interpolated at {1 / dt:.4g} Hz", start, end, True))
     values: dict[str, FloatArray] = {}
     missing: dict[str, NDArray[np.bool_]] = {}
@@ -68,7 +69,7 @@ def _gaps(time: FloatArray, at: FloatArray) -> NDArray[np.bool_]:
     after = np.searchsorted(at, time)
     left, right = at[np.clip(after - 1, 0, None)], at[np.clip(after, None, len(at) - 1)]
     inside = (right - left > limit) & (time > left) & (time < right)
-    return inside | (time < at[0] - limit) | (time > at[-1] + limit)
+    return np.asarray(inside | (time < at[0] - limit) | (time > at[-1] + limit), dtype=np.bool_)
 
 
 def _span(times: FloatArray) -> tuple[float, float]:

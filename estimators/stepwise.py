@@ -27,6 +27,7 @@ class Step:
     pse: float
 
     def __str__(self) -> str:
+        """One line of the history."""
         return f"{self.action:8s} {self.term:16s} F {self.partial_f:10.1f}  R2 {self.r2:.4f}  PSE {self.pse:.3e}"
 
 

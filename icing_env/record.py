@@ -158,7 +158,8 @@ def without_empty_thrust(record: FlightRecord) -> FlightRecord:
     zero = [n for n in ("thrust_left", "thrust_right") if n in record.channels and not np.nan_to_num(record[n]).any()]
     if not zero or len(record) == 0:
         return record
-    found = [DataProblem(n, "zeros, taken as absent", float(record.time[0]), float(record.time[-1]), True) for n in zero]
+    span = float(record.time[0]), float(record.time[-1])
+    found = [DataProblem(name, "zeros, taken as absent", *span, True) for name in zero]
     kept = {n: v for n, v in record.channels.items() if n not in zero}
     return replace(record, channels=kept).with_problems(found)
 

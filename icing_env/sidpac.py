@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
 
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray, Geometry, RecordMeta
@@ -49,8 +48,9 @@ def read_mat(path: Path) -> FlightRecord:
     digest = hashlib.sha256(raw).hexdigest()
     try:
         mat = loadmat(path, squeeze_me=True, struct_as_record=False)
-    except (MatReadError, ValueError, TypeError, NotImplementedError, OSError) as error:
-        raise InputError(f"{path}: not a MATLAB file that can be read (version 7 or older): {error}") from error
+    except Exception as error:  # scipy raises whatever a damaged header leads it to
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"{path}: not a MATLAB file that can be read (version 7 or older): {why}") from error
     if "fdata" not in mat:
         found = ", ".join(name for name in mat if not name.startswith("__")) or "nothing"
         raise InputError(f"{path}: no matrix 'fdata' (SIDPAC, N x 90); found: {found}")
@@ -83,10 +83,17 @@ def _time(fdata: FloatArray, mat: dict[str, Any], path: Path, notes: list[str]) 
     if t.shape == (len(fdata),) and np.all(np.diff(t) > 0):
         notes.append("time from variable t, column 1 does not increase")
         return np.asarray(t, dtype=np.float64)
-    if np.size(mat.get("dt")) == 1 and float(mat["dt"]) > 0:
+    dt = _number(mat, "dt")
+    if dt is not None and dt > 0:
         notes.append("time from variable dt, column 1 does not increase")
-        return np.arange(len(fdata)) * float(mat["dt"])
+        return np.arange(len(fdata), dtype=np.float64) * np.float64(dt)
     raise InputError(f"{path}: time (column 1 of fdata, variable t) does not increase and there is no dt")
+
+
+def _number(mat: dict[str, Any], name: str) -> float | None:
+    """A variable of the file that is one number; None where it is absent or something else."""
+    value = np.asarray(mat.get(name, ""))
+    return float(value) if value.size == 1 and value.dtype.kind in "fiu" else None
 
 
 def _mean(fdata: FloatArray, column: int, unit: float) -> float | None:
@@ -101,7 +108,7 @@ def _geometry(fdata: FloatArray, mat: dict[str, Any]) -> Geometry | None:
     found = []
     for column, name, unit in ((77, "sarea", FT**2), (78, "bspan", FT), (79, "cbar", FT)):
         value = _mean(fdata, column, unit)
-        if value is None and np.size(mat.get(name)) == 1:
+        if value is None and _number(mat, name) is not None:
             value = float(mat[name]) * unit
         if value is None or not value > 0:
             return None

@@ -190,7 +190,13 @@ def test_low_pass_keeps_phase_and_removes_the_boom() -> None:
 def test_stepwise_finds_the_cubic_and_leaves_the_rest() -> None:
     rng = np.random.default_rng(3)
     alpha, de = 0.2 * rng.standard_normal(400), 0.1 * rng.standard_normal(400)
-    candidates = {"alpha": alpha, "elevator": de, "alpha*elevator": alpha * de, "alpha^3": alpha**3, "twin": alpha * 1.001}
+    candidates = {
+        "alpha": alpha,
+        "elevator": de,
+        "alpha*elevator": alpha * de,
+        "alpha^3": alpha**3,
+        "twin": 1.1 * alpha,
+    }
     target = 0.1 - 1.4 * alpha - 1.8 * de + 9.0 * alpha**3 + 0.01 * rng.standard_normal(400)
     found = stepwise(candidates, target, forced=("alpha", "elevator"))
     assert set(found.terms) == {"alpha", "elevator", "alpha^3", "1"}
