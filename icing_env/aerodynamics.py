@@ -66,25 +66,25 @@ def smootherstep(x: float) -> float:
 
 @kernel
 def separation(alpha: float, onset: float, p) -> float:
-    """Separated share, 0..1, of a half wing at its local angle of attack."""
-    return (smootherstep((alpha - onset)/p.stall_width)
-            + smootherstep((-alpha - p.alpha_stall_negative)/p.stall_width))
+    """Separated share, 0..1, of a half wing at its local angle of attack (upright and inverted stall)."""
+    return smootherstep(max(alpha - onset, -alpha - p.alpha_stall_negative)/p.stall_width)
 
 
 @kernel
-def tail_angle(alpha: float, alpha_downwash: float, q: float, airspeed: float, x, s, p) -> float:
+def tail_angle(alpha: float, arrival: float, q: float, slowness: float, x, p) -> float:
     """Angle of attack at the tailplane [rad]: downwash of the past, pitch rate, and the gust that arrives there now."""
-    return (alpha - p.downwash_slope*alpha_downwash - p.downwash_flap*x.flap + p.tail_incidence
-            + (q*p.tail_arm + s.gust_w - s.gust_w_tail)/airspeed)
+    return (alpha + arrival - p.downwash_slope*x.alpha_downwash - p.downwash_flap*x.flap + p.tail_incidence
+            + q*p.tail_arm*slowness)
 
 
 @kernel
 def longitudinal(alpha: float, sine: float, qhat: float, left: float, right: float, tail: float, ct: float, low: float,
-                 airspeed: float, x, s, c, p) -> tuple:
+                 arrival: float, x, c, p) -> tuple:
     """CX, CZ of the left and right half wing (each referred to the whole area), the rest of CX and CZ, and Cm.
 
-    `sine`: of alpha; `left`, `right`, `tail`: separated shares; `ct`: thrust coefficient less its reference; `low`: 0 in free air, 1 at
-    the ground (McCormick, Aerodynamics, Aeronautics and Flight Mechanics, eq. 7.x: (16 h/b)^2/(1 + (16 h/b)^2)).
+    `sine`: of alpha; `left`, `right`, `tail`: separated shares; `ct`: thrust coefficient less its reference; `low`: 0 in
+    free air, 1 at the ground (McCormick, Aerodynamics, Aeronautics and Flight Mechanics, 2nd ed., section 7: induced
+    drag times (16 h/b)^2/(1 + (16 h/b)^2)); `arrival`: gust angle at the tail less that at the wing [rad].
     """
     plate = -sine/(0.283 + 0.222*abs(sine))
     suction = alpha*(c.CX_alpha + c.CX_alpha2*alpha)
@@ -99,7 +99,7 @@ def longitudinal(alpha: float, sine: float, qhat: float, left: float, right: flo
     share = 0.5*(left + right)
     lag = p.Cm_alphadot*p.chord/(2.0*p.tail_arm)*(alpha - x.alpha_downwash)
     cm = (c.Cm_0 + c.Cm_alpha*((1.0 - share)*alpha + share*p.Cm_alpha_separated*sine)
-          + (c.Cm_q - p.Cm_alphadot)*qhat + lag + p.Cm_alpha_tail*(s.gust_w - s.gust_w_tail)/airspeed
+          + (c.Cm_q - p.Cm_alphadot)*qhat + lag + p.Cm_alpha_tail*arrival
           + c.Cm_elevator*x.elevator*(1.0 + p.Cm_elevator_CT*ct)*(1.0 - p.tail_stall_elevator_loss*tail)
           + p.Cm_flap*x.flap + p.Cm_CT*ct + low*p.ground_moment)
     return axial_left, axial_right, lift_left, lift_right, rest_x, rest_z, cm

@@ -13,10 +13,10 @@ import math
 
 from icing_env.actuators import aileron_hinge_moment, elevator_hinge_moment, floated, surface_rate
 from icing_env.aerodynamics import CT_MAX, lateral, longitudinal, separation, smootherstep, tail_angle
-from icing_env.atmosphere import GAS_CONSTANT, gravity, pressure, temperature
-from icing_env.frames import to_body, to_local
+from icing_env.atmosphere import GAS_CONSTANT, gravity, static_air
+from icing_env.frames import direction_cosines, to_body, to_local
 from icing_env.jit import kernel
-from icing_env.propulsion import power_wanted, thrust_per_power
+from icing_env.propulsion import power_available, thrust_per_power
 from icing_env.wind import wind
 
 FLAP_LAG = 0.2  # s, rounds the corner where the flap arrives (assumed)
@@ -24,10 +24,13 @@ AIRSPEED_FLOOR = 0.1524  # m/s (0.5 ft/s), floor of the normalised rates (NASA/T
 
 
 @kernel
-def air_data(x, s, p) -> tuple:
-    """Airspeed [m/s], alpha, beta [rad], sine of alpha, and axial airspeed, from inertial velocity, wind and gust."""
+def air_data(x, attitude: tuple, s, p) -> tuple:
+    """Airspeed [m/s], alpha, beta [rad], sine of alpha and the air velocity along body x, y, z.
+
+    Inertial velocity less wind less gust; `attitude`: the direction cosines.
+    """
     north, east, down = wind(x.altitude, p)
-    wx, wy, wz = to_body(x.e0, x.e1, x.e2, x.e3, north, east, down)
+    wx, wy, wz = to_body(attitude, north, east, down)
     ua, va, wa = x.u - wx - s.gust_u, x.v - wy - s.gust_v, x.w - wz - s.gust_w
     plane = math.sqrt(ua*ua + wa*wa)
     airspeed = math.sqrt(plane*plane + va*va)
@@ -39,18 +42,19 @@ def air_data(x, s, p) -> tuple:
 
 
 @kernel
-def forces(x, s, c, p) -> tuple:
+def forces(x, attitude: tuple, s, c, p) -> tuple:
     """Aerodynamic and propulsive force [N] and moment about the c.g. [N m], and what instruments and controls need.
 
     Returns: Fx, Fy, Fz, L, M, N, airspeed, alpha, beta, density, thrust left, thrust right, elevator and aileron hinge
     moments, static pressure.
     """
-    static = pressure(x.altitude)
-    density = p.density_factor*static/(GAS_CONSTANT*(temperature(x.altitude) + p.temperature_offset))
-    airspeed, alpha, beta, sine, ua, va, wa = air_data(x, s, p)
+    kelvin, static = static_air(x.altitude)
+    density = p.density_factor*static/(GAS_CONSTANT*(kelvin + p.temperature_offset))
+    airspeed, alpha, beta, sine, ua, va, wa = air_data(x, attitude, s, p)
     speed = max(airspeed, AIRSPEED_FLOOR)
     qbar = 0.5*density*airspeed*airspeed
-    half = 0.5/speed
+    slowness = 1.0/speed
+    half = 0.5*slowness
     pa, qa, ra = x.p - s.gust_p, x.q - s.gust_q, x.r - s.gust_r
     phat, qhat, rhat = pa*p.span*half, qa*p.chord*half, ra*p.span*half
 
@@ -65,20 +69,21 @@ def forces(x, s, c, p) -> tuple:
     flap_shift = p.alpha_stall_flap*x.flap
     left = separation(alpha - wingtip, c.alpha_stall_left + flap_shift, p)
     right = separation(alpha + wingtip, c.alpha_stall_right + flap_shift, p)
-    alpha_tail = tail_angle(alpha, x.alpha_downwash, qa, speed, x, s, p)
+    arrival = (s.gust_w - s.gust_w_tail)*slowness
+    alpha_tail = tail_angle(alpha, arrival, qa, slowness, x, p)
     tail = smootherstep((-alpha_tail - c.alpha_tail_stall)/p.tail_stall_width)
-    height = 16.0*(x.altitude - p.ground_altitude)/p.span
-    low = 1.0/(1.0 + height*height)
+    height = 16.0*(x.altitude - p.ground_altitude)
+    low = p.span*p.span/(p.span*p.span + height*height)
 
     axial_left, axial_right, lift_left, lift_right, rest_x, rest_z, cm = longitudinal(
-        alpha, sine, qhat, left, right, tail, ct, low, speed, x, s, c, p)
+        alpha, sine, qhat, left, right, tail, ct, low, arrival, x, c, p)
     cy, cl, cn = lateral(alpha, beta, phat, rhat, 0.5*(left + right), x, c, p)
     # a stalled tailplane keeps only the download it had at the onset
     cm -= tail*p.Cm_alpha_tail*(alpha_tail + c.alpha_tail_stall)
     cl += 0.5*p.lift_arm*(lift_right - lift_left)
     cn -= 0.5*p.lift_arm*(axial_right - axial_left)
 
-    bluff = qs*c.CD_parasite/max(airspeed, 1e-9)
+    bluff = 0.5*density*airspeed*p.wing_area*c.CD_parasite
     fx = qs*(0.5*(axial_left + axial_right) + rest_x) - bluff*ua + thrust
     fy = qs*cy - bluff*va
     fz = qs*(0.5*(lift_left + lift_right) + rest_z) - bluff*wa
@@ -92,13 +97,13 @@ def forces(x, s, c, p) -> tuple:
 
 
 @kernel
-def rigid_body(x, dx, fx, fy, fz, roll, pitch, yaw, c, p) -> None:
+def rigid_body(x, attitude: tuple, dx, fx, fy, fz, roll, pitch, yaw, c, p) -> None:
     """Newton and Euler: rates of velocity, attitude, rotation and position from force [N] and moment [N m]."""
     g = gravity(x.altitude, p.gravity_sea_level, p.earth_radius)
-    gx, gy, gz = to_body(x.e0, x.e1, x.e2, x.e3, 0.0, 0.0, g)
-    dx.u = x.r*x.v - x.q*x.w + gx + fx/c.mass
-    dx.v = x.p*x.w - x.r*x.u + gy + fy/c.mass
-    dx.w = x.q*x.u - x.p*x.v + gz + fz/c.mass
+    per_mass = 1.0/c.mass
+    dx.u = x.r*x.v - x.q*x.w + attitude[2]*g + fx*per_mass
+    dx.v = x.p*x.w - x.r*x.u + attitude[5]*g + fy*per_mass
+    dx.w = x.q*x.u - x.p*x.v + attitude[8]*g + fz*per_mass
     dx.e0 = -0.5*(x.e1*x.p + x.e2*x.q + x.e3*x.r)
     dx.e1 = 0.5*(x.e0*x.p + x.e2*x.r - x.e3*x.q)
     dx.e2 = 0.5*(x.e0*x.q + x.e3*x.p - x.e1*x.r)
@@ -106,11 +111,11 @@ def rigid_body(x, dx, fx, fy, fz, roll, pitch, yaw, c, p) -> None:
     ixx, iyy, izz, ixz = p.inertia_xx, p.inertia_yy, p.inertia_zz, p.inertia_xz
     rolling = roll + ixz*x.p*x.q + (iyy - izz)*x.q*x.r
     yawing = yaw - ixz*x.q*x.r + (ixx - iyy)*x.p*x.q
-    determinant = ixx*izz - ixz*ixz
-    dx.p = (izz*rolling + ixz*yawing)/determinant
+    determinant = 1.0/(ixx*izz - ixz*ixz)
+    dx.p = (izz*rolling + ixz*yawing)*determinant
     dx.q = (pitch + (izz - ixx)*x.p*x.r - ixz*(x.p*x.p - x.r*x.r))/iyy
-    dx.r = (ixx*yawing + ixz*rolling)/determinant
-    north, east, down = to_local(x.e0, x.e1, x.e2, x.e3, x.u, x.v, x.w)
+    dx.r = (ixx*yawing + ixz*rolling)*determinant
+    north, east, down = to_local(attitude, x.u, x.v, x.w)
     dx.north, dx.east, dx.altitude = north, east, -down
 
 
@@ -130,15 +135,17 @@ def controls_and_engines(x, dx, u, hinge_e, hinge_a, static, p) -> None:
     dx.rudder = surface_rate(x.rudder, p.rudder_gearing*u.rudder + p.rudder_offset,
                              p.rudder_min, p.rudder_max, p.rudder_lag, p.rudder_rate)
     dx.flap = surface_rate(x.flap, u.flap, 0.0, p.flap_max, FLAP_LAG, p.flap_rate)
-    dx.power_left = (power_wanted(u.throttle_left, static, p) - x.power_left)/p.spool_time
-    dx.power_right = (power_wanted(u.throttle_right, static, p) - x.power_right)/p.spool_time
+    full, spool = power_available(static, p), 1.0/p.spool_time
+    dx.power_left = (full*min(max(u.throttle_left, 0.0), 1.0) - x.power_left)*spool
+    dx.power_right = (full*min(max(u.throttle_right, 0.0), 1.0) - x.power_right)*spool
 
 
 @kernel
 def derivative(x, dx, s, c, p, u) -> None:
     """Rates of the whole continuous state, written into `dx`."""
+    attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
     (fx, fy, fz, roll, pitch, yaw, airspeed, alpha, _beta, _density, _left, _right,
-     hinge_e, hinge_a, static) = forces(x, s, c, p)
-    rigid_body(x, dx, fx, fy, fz, roll, pitch, yaw, c, p)
+     hinge_e, hinge_a, static) = forces(x, attitude, s, c, p)
+    rigid_body(x, attitude, dx, fx, fy, fz, roll, pitch, yaw, c, p)
     controls_and_engines(x, dx, u, hinge_e, hinge_a, static, p)
     dx.alpha_downwash = (alpha - x.alpha_downwash)*max(airspeed, AIRSPEED_FLOOR)/p.tail_arm

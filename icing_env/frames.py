@@ -10,21 +10,30 @@ from icing_env.jit import kernel
 
 
 @kernel
-def to_body(e0: float, e1: float, e2: float, e3: float, north: float, east: float, down: float) -> tuple:
-    """Components along the body axes of a vector given in the local frame."""
-    x = (e0*e0 + e1*e1 - e2*e2 - e3*e3)*north + 2.0*(e1*e2 + e0*e3)*east + 2.0*(e1*e3 - e0*e2)*down
-    y = 2.0*(e1*e2 - e0*e3)*north + (e0*e0 - e1*e1 + e2*e2 - e3*e3)*east + 2.0*(e2*e3 + e0*e1)*down
-    z = 2.0*(e1*e3 + e0*e2)*north + 2.0*(e2*e3 - e0*e1)*east + (e0*e0 - e1*e1 - e2*e2 + e3*e3)*down
-    return x, y, z
+def direction_cosines(e0: float, e1: float, e2: float, e3: float) -> tuple:
+    """Rows x, y, z of the matrix C with v_body = C v_local, nine numbers."""
+    xx, yy, zz, ww = e1*e1, e2*e2, e3*e3, e0*e0
+    xy, xz, yz = 2.0*e1*e2, 2.0*e1*e3, 2.0*e2*e3
+    wx, wy, wz = 2.0*e0*e1, 2.0*e0*e2, 2.0*e0*e3
+    return (ww + xx - yy - zz, xy + wz, xz - wy,
+            xy - wz, ww - xx + yy - zz, yz + wx,
+            xz + wy, yz - wx, ww - xx - yy + zz)
 
 
 @kernel
-def to_local(e0: float, e1: float, e2: float, e3: float, x: float, y: float, z: float) -> tuple:
-    """Components north, east, down of a vector given along the body axes."""
-    north = (e0*e0 + e1*e1 - e2*e2 - e3*e3)*x + 2.0*(e1*e2 - e0*e3)*y + 2.0*(e1*e3 + e0*e2)*z
-    east = 2.0*(e1*e2 + e0*e3)*x + (e0*e0 - e1*e1 + e2*e2 - e3*e3)*y + 2.0*(e2*e3 - e0*e1)*z
-    down = 2.0*(e1*e3 - e0*e2)*x + 2.0*(e2*e3 + e0*e1)*y + (e0*e0 - e1*e1 - e2*e2 + e3*e3)*z
-    return north, east, down
+def to_body(c: tuple, north: float, east: float, down: float) -> tuple:
+    """Components along the body axes of a vector given in the local frame; `c` from `direction_cosines`."""
+    return (c[0]*north + c[1]*east + c[2]*down,
+            c[3]*north + c[4]*east + c[5]*down,
+            c[6]*north + c[7]*east + c[8]*down)
+
+
+@kernel
+def to_local(c: tuple, x: float, y: float, z: float) -> tuple:
+    """Components north, east, down of a vector given along the body axes; `c` from `direction_cosines`."""
+    return (c[0]*x + c[3]*y + c[6]*z,
+            c[1]*x + c[4]*y + c[7]*z,
+            c[2]*x + c[5]*y + c[8]*z)
 
 
 @kernel

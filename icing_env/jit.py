@@ -46,7 +46,7 @@ def cache_folder() -> str:
 
 def kernel(function: F) -> F:
     """Compile a scalar building block; called only from other compiled functions."""
-    return numba.njit(function, error_model="numpy")  # type: ignore[no-any-return]
+    return numba.njit(function, error_model="numpy", forceinline=True)  # type: ignore[no-any-return]
 
 
 def entry(function: F) -> F:

@@ -32,10 +32,10 @@ PROPULSION_PARAMETERS: list[Field] = [
 
 
 @kernel
-def power_wanted(throttle: float, pressure: float, p) -> float:
-    """Shaft power [W] that the lever (0..1) asks for at a static pressure [Pa]."""
-    loss = 1.0 - pressure/P0
-    return min(max(throttle, 0.0), 1.0)*p.power_rated*(1.0 - loss*(p.power_lapse + p.power_lapse2*loss))
+def power_available(pressure: float, p) -> float:
+    """Shaft power [W] of one engine at full throttle and a static pressure [Pa]."""
+    loss = 1.0 - pressure*(1.0/P0)
+    return p.power_rated*(1.0 - loss*(p.power_lapse + p.power_lapse2*loss))
 
 
 @kernel

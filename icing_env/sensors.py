@@ -16,10 +16,10 @@ import math
 
 from icing_env.atmosphere import pressure_altitude
 from icing_env.dynamics import forces
-from icing_env.frames import euler_angles, to_local
+from icing_env.frames import direction_cosines, euler_angles, to_local
 from icing_env.jit import kernel
 from icing_env.propulsion import torque
-from icing_env.random import normal4
+from icing_env.random import STREAM_SENSORS, normal4
 from icing_env.types import Field
 
 NOISY = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "psi", "ax", "ay", "az", "elevator", "aileron",
@@ -41,7 +41,6 @@ SENSOR_PARAMETERS: list[Field] = [
     ("boom_gain", "rad s2/m", "flow-angle error per normal acceleration"),
     ("filter_frequency", "Hz", "cut-off of the anti-boom low pass"),
 ]
-SENSOR_STREAM = 3  # random stream of the instruments
 
 
 @kernel
@@ -51,22 +50,35 @@ def lag_gain(dt: float, time_constant: float) -> float:
 
 
 @kernel
-def advance_boom(s, p, drive: float, dt: float) -> None:
-    """Nose boom as a damped oscillator under a normal acceleration [m/s2] held over the step, solved exactly."""
-    omega = 2.0*math.pi*p.boom_frequency
-    damped = omega*math.sqrt(1.0 - p.boom_damping*p.boom_damping)
-    rest = p.boom_gain*drive
-    decay = math.exp(-p.boom_damping*omega*dt)
-    cosine, sine = math.cos(damped*dt), math.sin(damped*dt)
-    away, rate = s.boom_position - rest, s.boom_rate
-    s.boom_position = rest + decay*(away*cosine + (rate + p.boom_damping*omega*away)/damped*sine)
-    s.boom_rate = decay*(rate*cosine - (p.boom_damping*omega*rate + omega*omega*away)/damped*sine)
+def hold_filter_constants(s, p, dt: float) -> None:
+    """Constants of lags, low pass and boom for a step `dt`; the boom's are its exact transition matrix."""
+    s.gain_pitot, s.gain_vane = lag_gain(dt, p.pitot_lag), lag_gain(dt, p.vane_lag)
+    s.gain_filter = 1.0 - math.exp(-2.0*math.pi*p.filter_frequency*dt)
+    omega, zeta = 2.0*math.pi*p.boom_frequency, p.boom_damping
+    damped = omega*math.sqrt(1.0 - zeta*zeta)
+    decay = math.exp(-zeta*omega*dt)
+    cosine, sine = decay*math.cos(damped*dt), decay*math.sin(damped*dt)
+    s.boom_xx = cosine + zeta*omega/damped*sine
+    s.boom_xv = sine/damped
+    s.boom_vx = -omega*omega/damped*sine
+    s.boom_vv = cosine - zeta*omega/damped*sine
 
 
 @kernel
-def start_instruments(x, s, c, p) -> None:
+def advance_boom(s, p, drive: float) -> None:
+    """Nose boom as a damped oscillator under a normal acceleration [m/s2] held over the step."""
+    rest = p.boom_gain*drive
+    away, rate = s.boom_position - rest, s.boom_rate
+    s.boom_position = rest + s.boom_xx*away + s.boom_xv*rate
+    s.boom_rate = s.boom_vx*away + s.boom_vv*rate
+
+
+@kernel
+def start_instruments(x, s, c, p, dt: float) -> None:
     """Settle every lag and filter on the present flight condition."""
-    fx, fy, fz, _l, _m, _n, airspeed, alpha, beta, _rho, _tl, _tr, _he, _ha, _ps = forces(x, s, c, p)
+    hold_filter_constants(s, p, dt)
+    attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
+    fx, fy, fz, _l, _m, _n, airspeed, alpha, beta, _rho, _tl, _tr, _he, _ha, _ps = forces(x, attitude, s, c, p)
     s.pitot, s.vane_alpha, s.vane_beta = airspeed, alpha, beta
     s.boom_position, s.boom_rate = 0.0, 0.0
     s.filtered_alpha, s.filtered_beta = alpha, beta
@@ -76,24 +88,22 @@ def start_instruments(x, s, c, p) -> None:
 
 
 @kernel
-def filter_flow_and_inertial(x, s, c, p, airspeed, alpha, beta, fx, fy, fz, dt: float) -> None:
+def filter_flow_and_inertial(x, s, c, p, airspeed, alpha, beta, fx, fy, fz) -> None:
     """Lags of pitot and vanes, the boom, then the same low pass on every fast channel."""
-    cut = 1.0 - math.exp(-2.0*math.pi*p.filter_frequency*dt)
-    vane = lag_gain(dt, p.vane_lag)
-    speed = max(airspeed, 1.0)
-    s.vane_alpha += vane*(alpha + p.vane_position_error*x.q/speed - s.vane_alpha)
-    s.vane_beta += vane*(beta - p.vane_position_error*x.r/speed - s.vane_beta)
-    if p.boom_gain != 0.0:
-        advance_boom(s, p, fz/c.mass + p.gravity_sea_level, dt)
-    s.pitot += lag_gain(dt, p.pitot_lag)*(airspeed*(1.0 + p.pitot_alpha*alpha) - s.pitot)
+    cut, per_mass = s.gain_filter, 1.0/c.mass
+    offset = p.vane_position_error/max(airspeed, 1.0)
+    s.vane_alpha += s.gain_vane*(alpha + offset*x.q - s.vane_alpha)
+    s.vane_beta += s.gain_vane*(beta - offset*x.r - s.vane_beta)
+    advance_boom(s, p, fz*per_mass + p.gravity_sea_level)
+    s.pitot += s.gain_pitot*(airspeed*(1.0 + p.pitot_alpha*alpha) - s.pitot)
     s.filtered_alpha += cut*(s.vane_alpha + s.boom_position - s.filtered_alpha)
     s.filtered_beta += cut*(s.vane_beta - s.filtered_beta)
     s.filtered_p += cut*(x.p - s.filtered_p)
     s.filtered_q += cut*(x.q - s.filtered_q)
     s.filtered_r += cut*(x.r - s.filtered_r)
-    s.filtered_ax += cut*(fx/c.mass - s.filtered_ax)
-    s.filtered_ay += cut*(fy/c.mass - s.filtered_ay)
-    s.filtered_az += cut*(fz/c.mass - s.filtered_az)
+    s.filtered_ax += cut*(fx*per_mass - s.filtered_ax)
+    s.filtered_ay += cut*(fy*per_mass - s.filtered_ay)
+    s.filtered_az += cut*(fz*per_mass - s.filtered_az)
     s.filtered_elevator += cut*(x.elevator - s.filtered_elevator)
     s.filtered_aileron += cut*(x.aileron - s.filtered_aileron)
     s.filtered_rudder += cut*(x.rudder - s.filtered_rudder)
@@ -102,17 +112,17 @@ def filter_flow_and_inertial(x, s, c, p, airspeed, alpha, beta, fx, fy, fz, dt: 
 @kernel
 def read_fast(s, m, p) -> None:
     """Flow, inertial and surface channels: scale, bias and noise (blocks 0 to 3 of the instrument stream)."""
-    n0, n1, n2, n3 = normal4(s.seed, SENSOR_STREAM, s.step, 0)
+    n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, 0)
     m.airspeed = (1.0 + p.scale_airspeed)*s.pitot + p.bias_airspeed + p.noise_airspeed*n0
     m.alpha = (1.0 + p.scale_alpha)*s.filtered_alpha + p.bias_alpha + p.noise_alpha*n1
     m.beta = (1.0 + p.scale_beta)*s.filtered_beta + p.bias_beta + p.noise_beta*n2
     m.elevator = s.filtered_elevator + p.bias_elevator + p.noise_elevator*n3
-    n0, n1, n2, n3 = normal4(s.seed, SENSOR_STREAM, s.step, 1)
+    n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, 1)
     m.p = (1.0 + p.scale_p)*s.filtered_p + p.bias_p + p.noise_p*n0
     m.q = (1.0 + p.scale_q)*s.filtered_q + p.bias_q + p.noise_q*n1
     m.r = (1.0 + p.scale_r)*s.filtered_r + p.bias_r + p.noise_r*n2
     m.aileron = s.filtered_aileron + p.bias_aileron + p.noise_aileron*n3
-    n0, n1, n2, n3 = normal4(s.seed, SENSOR_STREAM, s.step, 2)
+    n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, 2)
     m.ax = (1.0 + p.scale_ax)*s.filtered_ax + p.bias_ax + p.noise_ax*n0
     m.ay = (1.0 + p.scale_ay)*s.filtered_ay + p.bias_ay + p.noise_ay*n1
     m.az = (1.0 + p.scale_az)*s.filtered_az + p.bias_az + p.noise_az*n2
@@ -120,49 +130,59 @@ def read_fast(s, m, p) -> None:
 
 
 @kernel
-def read_attitude_and_engines(x, s, m, p, u, thrust_left, thrust_right, hinge_e, hinge_a, static) -> None:
-    """Attitude (heading kept continuous), altitude, engines, hinge moments (blocks 3 and 4)."""
+def read_attitude(x, s, m, p, u) -> float:
+    """Attitude (heading kept continuous), flap and levers (block 3); returns a noise to spare."""
     phi, theta, psi = euler_angles(x.e0, x.e1, x.e2, x.e3)
     turn = psi - m.psi
-    psi = m.psi + turn - 2.0*math.pi*math.floor(turn/(2.0*math.pi) + 0.5)
-    n0, n1, n2, n3 = normal4(s.seed, SENSOR_STREAM, s.step, 3)
+    psi = m.psi + turn - 2.0*math.pi*math.floor(turn*(0.5/math.pi) + 0.5)
+    n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, 3)
     m.phi = phi + p.bias_phi + p.noise_phi*n0
     m.theta = theta + p.bias_theta + p.noise_theta*n1
     m.psi = psi + p.noise_psi*n2
-    m.pressure = static + p.bias_pressure + p.noise_pressure*n3
-    m.altitude = pressure_altitude(m.pressure)
-    n0, n1, n2, n3 = normal4(s.seed, SENSOR_STREAM, s.step, 4)
+    m.flap = x.flap
+    m.throttle_left, m.throttle_right = u.throttle_left, u.throttle_right
+    return n3
+
+
+@kernel
+def read_engines_and_navigation(x, attitude: tuple, s, m, p, thrust_left, thrust_right, hinge_e, hinge_a, static,
+                                noise: float) -> None:
+    """Engines, hinge moments, static pressure, GPS, ten times a second (block 4)."""
+    n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, 4)
     m.thrust_left = (1.0 + p.scale_thrust)*thrust_left + p.noise_thrust*n0
     m.thrust_right = (1.0 + p.scale_thrust)*thrust_right + p.noise_thrust*n1
     m.hinge_moment_elevator = hinge_e + p.noise_hinge_moment*n2
     m.hinge_moment_aileron = hinge_a + p.noise_hinge_moment*n3
+    m.pressure = static + p.bias_pressure + p.noise_pressure*noise
+    m.altitude = pressure_altitude(m.pressure)
     m.torque_left, m.torque_right = torque(x.power_left, p), torque(x.power_right, p)
     m.rpm_left, m.rpm_right = p.propeller_rpm, p.propeller_rpm
-    m.flap = x.flap
-    m.throttle_left, m.throttle_right = u.throttle_left, u.throttle_right
+    north, east, _down = to_local(attitude, x.u, x.v, x.w)
+    m.ground_speed = math.sqrt(north*north + east*east)
+    m.track = math.atan2(east, north)
 
 
 @kernel
 def read_slow(s, m, p) -> None:
     """Temperature and cloud probes, once a second (block 5)."""
-    n0, n1, n2, _n3 = normal4(s.seed, SENSOR_STREAM, s.step, 5)
+    n0, n1, n2, _n3 = normal4(s.seed, STREAM_SENSORS, s.step, 5)
     m.temperature = s.temperature + p.bias_temperature + p.noise_temperature*n0
     m.lwc = max(0.0, s.lwc*(1.0 + p.noise_lwc*n1))
     m.mvd = s.mvd*max(0.0, 1.0 + p.noise_mvd*n2) if s.lwc > 0.0 else 0.0
 
 
 @kernel
-def read_instruments(x, s, m, c, p, u, o, slow: bool, dt: float) -> None:
-    """One sample of every instrument into `m`, and the true air data and load factor into `o`."""
+def read_instruments(x, s, m, c, p, u, o, ten_hertz: bool, one_hertz: bool) -> None:
+    """One sample of every instrument that is due into `m`, and the true air data and load factor into `o`."""
+    attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
     (fx, fy, fz, _l, _m, _n, airspeed, alpha, beta, _rho, thrust_left, thrust_right,
-     hinge_e, hinge_a, static) = forces(x, s, c, p)
-    filter_flow_and_inertial(x, s, c, p, airspeed, alpha, beta, fx, fy, fz, dt)
+     hinge_e, hinge_a, static) = forces(x, attitude, s, c, p)
+    filter_flow_and_inertial(x, s, c, p, airspeed, alpha, beta, fx, fy, fz)
     read_fast(s, m, p)
-    read_attitude_and_engines(x, s, m, p, u, thrust_left, thrust_right, hinge_e, hinge_a, static)
-    north, east, _down = to_local(x.e0, x.e1, x.e2, x.e3, x.u, x.v, x.w)
-    m.ground_speed = math.sqrt(north*north + east*east)
-    m.track = math.atan2(east, north)
-    if slow:
+    spare = read_attitude(x, s, m, p, u)
+    if ten_hertz:
+        read_engines_and_navigation(x, attitude, s, m, p, thrust_left, thrust_right, hinge_e, hinge_a, static, spare)
+    if one_hertz:
         read_slow(s, m, p)
     o.load_factor = -fz/(c.mass*p.gravity_sea_level)
     o.airspeed, o.alpha, o.beta = airspeed, alpha, beta

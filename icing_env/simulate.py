@@ -17,11 +17,12 @@ from icing_env.accretion import advance_accretion
 from icing_env.atmosphere import GAS_CONSTANT, pressure
 from icing_env.cloud import advance_cloud
 from icing_env.dynamics import air_data
+from icing_env.frames import direction_cosines
 from icing_env.ice_protection import advance_protection
 from icing_env.integrate import STAGES, normalise, rk4
 from icing_env.jit import entry, kernel
 from icing_env.parameters import PARAMETERS
-from icing_env.sensors import read_instruments, start_instruments
+from icing_env.sensors import hold_filter_constants, read_instruments, start_instruments
 from icing_env.severity import iced_aircraft
 from icing_env.turbulence import advance_turbulence, start_turbulence
 from icing_env.types import COMMAND, CONTINUOUS, CURRENT, MEASUREMENT, N_CONTINUOUS, OUTCOME, STATE
@@ -37,12 +38,13 @@ def advance_weather_and_ice(s, p, airspeed: float, dt: float) -> None:
 
 
 @kernel
-def fly(s, row, stage, rows, total, m, c, p, u, o, substeps: int, dt: float, slow_every: int) -> None:
+def fly(s, row, stage, rows, total, m, c, p, u, o, substeps: int, dt: float, ten_hertz: int, one_hertz: int) -> None:
     """One environment step of one aircraft."""
-    slow = s.step % slow_every == 0
+    slow = s.step % one_hertz == 0
     airspeed = o.airspeed
     if slow:
-        advance_weather_and_ice(s, p, airspeed, dt*slow_every)
+        advance_weather_and_ice(s, p, airspeed, dt*one_hertz)
+        hold_filter_constants(s, p, dt)
     advance_protection(s, p, u, dt)
     iced_aircraft(s, p, c)
     advance_turbulence(s, p, airspeed, dt)
@@ -55,17 +57,17 @@ def fly(s, row, stage, rows, total, m, c, p, u, o, substeps: int, dt: float, slo
         row[i] = rows[0, i]
     s.step += 1
     m.time = s.step*dt
-    read_instruments(stage[0], s, m, c, p, u, o, slow, dt)
+    read_instruments(stage[0], s, m, c, p, u, o, s.step % ten_hertz == 0, slow)
 
 
 @entry
 def advance(state, state_rows, stage, rows, total, measurement, current, parameters, command, outcome,
-            substeps, dt, slow_every) -> None:
+            substeps, dt, ten_hertz, one_hertz) -> None:
     """One environment step of every row; `parameters` has a row per aircraft or one for all."""
     shared = len(parameters) == 1
     for i in range(len(state)):
         fly(state[i], state_rows[i], stage, rows, total, measurement[i], current[i],
-            parameters[0 if shared else i], command[i], outcome[i], substeps, dt, slow_every)
+            parameters[0 if shared else i], command[i], outcome[i], substeps, dt, ten_hertz, one_hertz)
 
 
 @entry
@@ -77,11 +79,11 @@ def start(state, state_rows, stage, rows, measurement, current, parameters, comm
         for j in range(N_CONTINUOUS):
             rows[0, j] = state_rows[i, j]
         iced_aircraft(s, p, c)
-        start_turbulence(s, p, air_data(stage[0], s, p)[0])
-        start_instruments(stage[0], s, c, p)
+        start_turbulence(s, p, air_data(stage[0], direction_cosines(s.e0, s.e1, s.e2, s.e3), s, p)[0])
+        start_instruments(stage[0], s, c, p, dt)
         measurement[i].time = 0.0
         measurement[i].psi = 0.0
-        read_instruments(stage[0], s, measurement[i], c, p, command[i], outcome[i], True, dt)
+        read_instruments(stage[0], s, measurement[i], c, p, command[i], outcome[i], True, True)
 
 
 def scratch() -> tuple[NDArray, NDArray, NDArray]:
@@ -108,7 +110,7 @@ class Fleet:
         if parameters.dtype != PARAMETERS or len(parameters) not in (1, n):
             raise ValueError(f"parameters must be a PARAMETERS array of 1 or {n} rows")
         self.parameters, self.n, self.dt, self.substeps = parameters, n, dt, substeps
-        self.slow_every = max(1, round(1.0/dt))
+        self.clocks = max(1, round(0.1/dt)), max(1, round(1.0/dt))  # steps per sample at 10 Hz and 1 Hz
         self.state = np.zeros(n, STATE)
         self.state_rows = self.state.view(np.float64).reshape(n, -1)
         self.measurement = np.zeros(n, MEASUREMENT)
@@ -127,7 +129,7 @@ class Fleet:
         self._arguments = [
             (self.state[k], self.state_rows[k], *work, self.measurement[k], self.current[k],
              self.parameters if shared else self.parameters[k], self.command[k], self.outcome[k],
-             self.substeps, self.dt, self.slow_every)
+             self.substeps, self.dt, *self.clocks)
             for k, work in zip(self._slices, self._scratch, strict=True)
         ]
 

@@ -17,9 +17,9 @@ from icing_env.atmosphere import pressure
 from icing_env.dynamics import derivative, forces
 from icing_env.actuators import floated
 from icing_env.errors import InputError
-from icing_env.frames import euler_angles, quaternion, to_body, to_local
+from icing_env.frames import direction_cosines, euler_angles, quaternion, to_body, to_local
 from icing_env.jit import entry, kernel
-from icing_env.propulsion import power_wanted
+from icing_env.propulsion import power_available
 from icing_env.severity import iced_aircraft
 from icing_env.types import COMMAND, CONTINUOUS, CURRENT, STATE, Field, structured
 from icing_env.wind import wind
@@ -47,7 +47,7 @@ def place(z, x, s, k, u, p) -> None:
     x.altitude, x.flap = k.altitude, k.flap
     x.e0, x.e1, x.e2, x.e3 = quaternion(phi, theta, k.heading)
     north, east, down = wind(k.altitude, p)
-    wx, wy, wz = to_body(x.e0, x.e1, x.e2, x.e3, north, east, down)
+    wx, wy, wz = to_body(direction_cosines(x.e0, x.e1, x.e2, x.e3), north, east, down)
     x.u = k.airspeed*math.cos(alpha)*math.cos(beta) + wx
     x.v = k.airspeed*math.sin(beta) + wy
     x.w = k.airspeed*math.sin(alpha)*math.cos(beta) + wz
@@ -55,7 +55,7 @@ def place(z, x, s, k, u, p) -> None:
     x.q = k.turn_rate*math.sin(phi)*math.cos(theta)
     x.r = k.turn_rate*math.cos(phi)*math.cos(theta)
     x.elevator, x.aileron, x.rudder = z[4], z[5], z[6]
-    full = power_wanted(1.0, pressure(k.altitude), p)
+    full = power_available(pressure(k.altitude), p)
     x.power_left, x.power_right = z[7]*k.share_left*full, z[7]*k.share_right*full
     x.alpha_downwash = alpha
     u.throttle_left, u.throttle_right = z[7]*k.share_left, z[7]*k.share_right
@@ -69,7 +69,7 @@ def residual(z, out, x, dx, s, c, k, u, p) -> None:
     out[0], out[1], out[2] = dx.u, dx.v, dx.w
     out[3], out[4], out[5] = dx.p, dx.q, dx.r
     _n, _e, wind_down = wind(k.altitude, p)
-    _north, _east, down = to_local(x.e0, x.e1, x.e2, x.e3, x.u, x.v, x.w)
+    _north, _east, down = to_local(direction_cosines(x.e0, x.e1, x.e2, x.e3), x.u, x.v, x.w)
     out[6] = wind_down - down - k.airspeed*math.sin(k.climb_angle)
     out[7] = z[1] - k.beta
 
@@ -77,7 +77,7 @@ def residual(z, out, x, dx, s, c, k, u, p) -> None:
 @kernel
 def command_of(x, s, c, u, p) -> None:
     """Surface commands that hold the present positions, gearing, rigging and hinge moments taken out."""
-    values = forces(x, s, c, p)
+    values = forces(x, direction_cosines(x.e0, x.e1, x.e2, x.e3), s, c, p)
     u.elevator = (x.elevator - p.elevator_offset
                   - floated(values[12], p.hinge_elevator_hold, p.hinge_elevator_stiffness))/p.elevator_gearing
     u.aileron = (x.aileron - p.aileron_offset

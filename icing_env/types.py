@@ -95,7 +95,20 @@ INSTRUMENT_FIELDS: list[Field] = [
         ("elevator", "rad"), ("aileron", "rad"), ("rudder", "rad"))),
 ]
 
-STATE_FIELDS = CONTINUOUS_FIELDS + GUST_FIELDS + CLOUD_FIELDS + ICE_FIELDS + PROTECTION_FIELDS + INSTRUMENT_FIELDS
+# Constants of the instruments' filters at the present step, renewed on the slow clock.
+HELD_FIELDS: list[Field] = [
+    ("gain_pitot", "1", "share of the way the pitot lag goes in a step"),
+    ("gain_vane", "1", "the same for the flow vanes"),
+    ("gain_filter", "1", "the same for the anti-boom low pass"),
+    ("boom_xx", "1", "boom deflection after a step per deflection before"),
+    ("boom_xv", "s", "boom deflection after a step per rate before"),
+    ("boom_vx", "1/s", "boom rate after a step per deflection before"),
+    ("boom_vv", "1", "boom rate after a step per rate before"),
+]
+
+STATE_FIELDS = (
+    CONTINUOUS_FIELDS + GUST_FIELDS + CLOUD_FIELDS + ICE_FIELDS + PROTECTION_FIELDS + INSTRUMENT_FIELDS + HELD_FIELDS
+)
 
 # What is asked of the aircraft: surfaces, power, ice protection.
 COMMAND_FIELDS: list[Field] = [
@@ -111,7 +124,7 @@ COMMAND_FIELDS: list[Field] = [
     ("prop_heat", "0/1", "electric propeller heat"),
 ]
 
-# What the instruments read. Slow channels (marked 1 Hz) keep their value between samples.
+# What the instruments read. Channels marked 10 Hz or 1 Hz keep their value between samples.
 MEASUREMENT_FIELDS: list[Field] = [
     ("time", "s", "time since reset"),
     ("airspeed", "m/s", "true airspeed"),
@@ -132,21 +145,21 @@ MEASUREMENT_FIELDS: list[Field] = [
     ("flap", "rad", "measured position"),
     ("throttle_left", "0..1", "power lever"),
     ("throttle_right", "0..1", "power lever"),
-    ("thrust_left", "N", "thrust from torque, speed of rotation and the propeller chart"),
-    ("thrust_right", "N", "the same on the right"),
-    ("torque_left", "N m", "shaft torque"),
-    ("torque_right", "N m", "shaft torque"),
-    ("rpm_left", "1/min", "propeller speed"),
-    ("rpm_right", "1/min", "propeller speed"),
-    ("altitude", "m", "pressure altitude"),
+    ("thrust_left", "N", "thrust from torque, speed of rotation and the propeller chart (10 Hz)"),
+    ("thrust_right", "N", "the same on the right (10 Hz)"),
+    ("torque_left", "N m", "shaft torque (10 Hz)"),
+    ("torque_right", "N m", "shaft torque (10 Hz)"),
+    ("rpm_left", "1/min", "propeller speed (10 Hz)"),
+    ("rpm_right", "1/min", "propeller speed (10 Hz)"),
+    ("altitude", "m", "pressure altitude (10 Hz)"),
     ("temperature", "K", "static temperature (1 Hz)"),
-    ("pressure", "Pa", "static pressure"),
+    ("pressure", "Pa", "static pressure (10 Hz)"),
     ("lwc", "kg/m3", "liquid water content (1 Hz)"),
     ("mvd", "m", "median volume diameter (1 Hz)"),
-    ("ground_speed", "m/s", "speed over ground"),
-    ("track", "rad", "track over ground"),
-    ("hinge_moment_elevator", "N m", "elevator hinge moment"),
-    ("hinge_moment_aileron", "N m", "aileron hinge moment"),
+    ("ground_speed", "m/s", "speed over ground (10 Hz)"),
+    ("track", "rad", "track over ground (10 Hz)"),
+    ("hinge_moment_elevator", "N m", "elevator hinge moment (10 Hz)"),
+    ("hinge_moment_aileron", "N m", "aileron hinge moment (10 Hz)"),
 ]
 
 # Aerodynamic coefficients as the aircraft is now (ice included): the truth that estimators are scored against.
