@@ -2,7 +2,7 @@
 
 C_iced = (1 + sum over surfaces of k_{C,surface} eta_surface) C, Bragg's form as used by the Smart Icing Systems project
 and the FlightGear/UIUC model (uiuc_ice.cpp); no factor falls below `ice_factor_floor`. The sums of the k over the
-surfaces are those of the UIUC TwinOtterAllIce file; configs/aircraft/ice_severity.toml gives their split.
+surfaces are those of the UIUC TwinOtterAllIce file; configs/ice/dhc6.toml gives their split.
 
 Drag is split by the paper's measured shares: wing and horizontal tail change CX_0 (body axis), the bluff parts add
 drag along the air stream, CD_parasite. The two half wings have their own severity, hence their own lift slope, axial
@@ -29,8 +29,8 @@ LATERAL = (
 BLUFF = ("vtail", "struts", "propeller", "other")
 
 SEVERITY_PARAMETERS: list[Field] = [
-    *((f"k_{c}_{s}", "1", f"relative change of {c} per eta of the {s}") for c in LONGITUDINAL for s in ("wing", "htail")),
-    *((f"k_{c}_{s}", "1", f"relative change of {c} per eta of the {s}") for c in LATERAL for s in ("wing", "vtail")),
+    *((f"k_{c}_{s}", "1", f"change of {c} per eta of the {s}, relative") for c in LONGITUDINAL for s in ("wing", "htail")),
+    *((f"k_{c}_{s}", "1", f"change of {c} per eta of the {s}, relative") for c in LATERAL for s in ("wing", "vtail")),
     *((f"k_CD_parasite_{s}", "1", f"drag coefficient added per eta of {s}") for s in BLUFF),
     ("k_alpha_stall_wing", "rad", "fall of a half wing's stall angle per saturated eta"),
     ("k_alpha_tail_stall_htail", "1", "relative change of the tail's stall angle per saturated eta"),

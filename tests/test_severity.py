@@ -14,7 +14,7 @@ from icing_env.types import CURRENT, DERIVATIVE_NAMES, STATE, SURFACES, structur
 
 CLEAN = [*DERIVATIVE_NAMES, "CD_parasite", "alpha_stall", "alpha_tail_stall", "mass"]
 PARAMETERS = structured([(name, "", "") for name in CLEAN] + severity.SEVERITY_PARAMETERS)
-CONFIG = Path(__file__).parents[1] / "configs/aircraft/ice_severity.toml"
+CONFIG = Path(__file__).parents[1] / "configs/ice/dhc6.toml"
 UIUC_CLEAN = {  # FGDATA Aircraft-uiuc/TwinOtter/aircraft.dat
     "CX_0": -0.0488, "CX_alpha": 0.223, "CX_alpha2": 1.659, "CZ_0": -0.360, "CZ_alpha": -5.660, "CZ_q": -19.97,
     "CZ_elevator": -0.608, "Cm_0": 0.040, "Cm_alpha": -1.310, "Cm_q": -34.2, "Cm_elevator": -1.740, "CY_beta": -0.6,
@@ -38,7 +38,7 @@ def ice_all(states, parameters, current):
 
 def parameters() -> np.ndarray:
     p = np.zeros(1, PARAMETERS).view(np.recarray)
-    for name, entry in tomllib.loads(CONFIG.read_text()).items():
+    for name, entry in tomllib.loads(CONFIG.read_text())["severity"].items():
         p[name] = entry["value"]
     for name, value in UIUC_CLEAN.items():
         p[name] = value
@@ -62,7 +62,7 @@ def zero_lift_drag(c: dict[str, float]) -> float:
 
 
 def test_configuration_has_every_parameter_and_no_other() -> None:
-    entries = tomllib.loads(CONFIG.read_text())
+    entries = tomllib.loads(CONFIG.read_text())["severity"]
     assert list(entries) == [name for name, _, _ in severity.SEVERITY_PARAMETERS]
     assert {name: entries[name]["unit"] for name in entries} == {n: u for n, u, _ in severity.SEVERITY_PARAMETERS}
     assert all(entry["source"] for entry in entries.values())

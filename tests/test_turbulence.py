@@ -126,7 +126,7 @@ def test_tail_meets_the_gust_later_and_no_weaker() -> None:
     assert tail.std() == pytest.approx(wing.std(), rel=0.01)
     low = signal.butter(4, 1.0, fs=100.0, output="sos")
     a, b = signal.sosfiltfilt(low, wing)[1000:-1000], signal.sosfiltfilt(low, tail)[1000:-1000]
-    shifts = range(0, 30)
+    shifts = range(30)
     best = max(shifts, key=lambda k: float(np.mean(a[: a.size - k] * b[k:])))
     assert best * 0.01 == pytest.approx(ARM / V, abs=0.011)
     assert not gusts["gust_p"].any()
