@@ -10,7 +10,7 @@ from flights import LATERAL, META, PITCH, V, flight_data, lateral, longitudinal
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimators.coefficients import airframe_of
+from estimators.coefficients import Airframe, airframe_of
 from estimators.data_checks import check
 from estimators.differentiate import low_pass, matched_kernel, slope, smooth
 from estimators.equation_error import identify
@@ -141,6 +141,15 @@ def test_what_is_lacking_is_named() -> None:
         identify(record, "book")
     with pytest.raises(InputError, match="stores no p_dot"):
         identify(record, "textbook")
+
+
+def test_a_silent_record_takes_the_default_airframe() -> None:
+    record, names = longitudinal(), ("mass", "inertia_xx", "inertia_yy", "inertia_zz", "inertia_xz")
+    fields = [(name, "f8") for name in (*names, "wing_area", "span", "chord")]
+    row = np.array([(META.mass, *META.inertia, 39.25, 19.81, 1.98)], dtype=fields)
+    silent = replace(record, meta=replace(META, mass=None, inertia=None, geometry=None))
+    for default in (row, row[0]):
+        assert identify(silent, default=Airframe.from_parameters(default)) == identify(record)
 
 
 def test_coloured_covariance_equals_its_double_sum() -> None:
