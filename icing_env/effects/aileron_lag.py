@@ -1,0 +1,22 @@
+"""The aileron follows its command more slowly."""
+
+from numpy.typing import NDArray
+
+from icing_env.effects.effect import Effect, Parameter, Values
+
+
+def apply(p: NDArray, values: Values) -> None:
+    p["aileron_lag"] += values["extra"]
+
+
+EFFECT = Effect(
+    name="aileron_lag",
+    component="actuator",
+    enters_at=("aileron_path",),
+    description="The aileron follows its command more slowly",
+    source="assumed: cable stretch, servo",
+    parameters=(
+        Parameter("extra", "s", neutral=0.0, typical=0.1, low=-0.04, high=0.5),
+    ),
+    apply=apply,
+)

@@ -1,0 +1,22 @@
+"""Drag of ice on unprotected parts, along the air stream."""
+
+from numpy.typing import NDArray
+
+from icing_env.effects.effect import Effect, Parameter, Values
+
+
+def apply(p: NDArray, values: Values) -> None:
+    p["CD_parasite"] += values["delta_CD_0"]
+
+
+EFFECT = Effect(
+    name="ice_drag",
+    component="aerodynamics",
+    enters_at=("x_force",),
+    description="Drag of ice on unprotected parts, along the air stream",
+    source="founding paper: delta CD0 0.02 to 0.03",
+    parameters=(
+        Parameter("delta_CD_0", "1", neutral=0.0, typical=0.015, low=-0.01, high=0.06),
+    ),
+    apply=apply,
+)

@@ -1,0 +1,22 @@
+"""The rudder moves more or less than it is told."""
+
+from numpy.typing import NDArray
+
+from icing_env.effects.effect import Effect, Parameter, Values
+
+
+def apply(p: NDArray, values: Values) -> None:
+    p["rudder_gearing"] *= 1.0 + values["change"]
+
+
+EFFECT = Effect(
+    name="rudder_gearing",
+    component="actuator",
+    enters_at=("rudder_path",),
+    description="The rudder moves more or less than it is told",
+    source="assumed: rigging",
+    parameters=(
+        Parameter("change", "1", neutral=0.0, typical=-0.1, low=-0.5, high=0.5),
+    ),
+    apply=apply,
+)
