@@ -1,12 +1,13 @@
 """A classical autopilot: pitch, altitude, climb-rate and airspeed holds; bank and heading holds; yaw damper.
 
 Successive loop closure (McRuer, Ashkenas & Graham, Aircraft Dynamics and Automatic Control, chapters 7-8; Stevens,
-Lewis & Johnson, Aircraft Control and Simulation, 3rd ed., section 4.6), with the structure of the pitch and roll attitude
-holds of the Smart Icing Systems autopilot. Signs: positive elevator pitches down, positive aileron rolls left,
+Lewis & Johnson, Aircraft Control and Simulation, 3rd ed., section 4.6), with the structure of the pitch and roll
+attitude holds of the Smart Icing Systems autopilot. Signs: positive elevator pitches down, positive aileron rolls left,
 positive rudder yaws left; so too little pitch gives negative elevator, too little bank negative aileron.
 
 * s = qbar_reference / qbar scales every surface gain, as surface power goes with dynamic pressure
-* vertical speed: baro-inertial complementary filter of second order, undisturbed by gusts on the vane
+* vertical speed and airspeed: complementary filters of acceleration with pressure altitude and pitot, so that neither
+  gusts on the vane nor noise of the pitot move the controls
 * theta_command = pitch trim + K (climb-rate error)/V + compensation of the lift lost in a bank
 * elevator = trim + s [K_theta (theta - theta_command) + K_q (q - q_turn)], q_turn = (g/V) sin phi tan phi
 * bank_command = atan(V K_psi (heading error)/g), slewed; aileron = trim + s [K_phi (phi - bank_command) + K_p p]
@@ -25,7 +26,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.kernels import air_density, airspeed_of, clip, integrated, wrapped
+from controllers.kernels import air_density, airspeed_of, airspeed_rate, clip, integrated, wrapped
 from controllers.parameters import read_parameters
 from icing_env.atmosphere import G0
 from icing_env.jit import entry, kernel
@@ -48,6 +49,8 @@ AUTOPILOT_FIELDS: list[Field] = [
     ("engaged", "0/1", "0 until the first step, which starts the integrators where the controls are"),
     ("altitude", "m", "altitude of the complementary filter"),
     ("climb_rate", "m/s", "vertical speed of the complementary filter"),
+    ("airspeed", "m/s", "airspeed of the complementary filter"),
+    ("climb_command", "m/s", "climb rate asked for now, slewed"),
     ("pitch_trim", "rad", "integrator of the climb-rate hold"),
     ("elevator_trim", "rad", "integrator of the pitch hold"),
     ("throttle_trim", "0..1", "integrator of the airspeed hold"),
@@ -68,6 +71,7 @@ GAINS_FIELDS: list[Field] = [
     ("K_turn", "rad", "pitch added per excess load factor in a bank, at the reference dynamic pressure"),
     ("vertical_bandwidth", "rad/s", "natural frequency of the baro-inertial filter"),
     ("vertical_damping", "1", "damping of the baro-inertial filter"),
+    ("airspeed_bandwidth", "rad/s", "bandwidth of the air-inertial filter"),
     ("K_airspeed", "s/m", "throttle per airspeed error"),
     ("K_airspeed_integral", "1/m", "throttle rate per airspeed error"),
     ("K_throttle_climb", "s/m", "throttle per climb-rate command"),
@@ -79,6 +83,7 @@ GAINS_FIELDS: list[Field] = [
     ("K_r", "s", "rudder per yaw rate beyond that of the turn"),
     ("K_ay_integral", "rad s/m", "rudder rate per lateral specific force"),
     ("climb_max", "m/s", "largest climb and descent rate asked for"),
+    ("climb_slew", "m/s2", "slew rate of the climb-rate command"),
     ("theta_min", "rad", "lowest pitch asked for"),
     ("theta_max", "rad", "highest pitch asked for"),
     ("alpha_margin", "rad", "distance kept from the advised alpha limit"),
@@ -108,38 +113,44 @@ def init(n: int) -> NDArray:
 
 
 @kernel
-def engage(a, m) -> None:
+def engage(a, m, t, g) -> None:
     """Start every integrator where the controls are, so that engaging moves nothing."""
     a.engaged = 1.0
     a.altitude = m.altitude
     a.climb_rate = airspeed_of(m)*math.sin(m.theta - m.alpha*math.cos(m.phi))
+    a.climb_command = a.climb_rate
+    a.airspeed = m.airspeed
     a.pitch_trim = m.theta
     a.elevator_trim = m.elevator
-    a.throttle_trim = 0.5*(m.throttle_left + m.throttle_right)
+    climb = 0.0 if t.pitch_mode == 0.0 else a.climb_rate
+    a.throttle_trim = 0.5*(m.throttle_left + m.throttle_right) - g.K_throttle_climb*climb
     a.bank_command = m.phi
     a.aileron_trim = m.aileron
     a.rudder_trim = m.rudder
 
 
 @kernel
-def vertical_speed(a, m, g, dt: float) -> None:
-    """Baro-inertial filter: integrates the vertical acceleration and is corrected by the pressure altitude."""
+def navigate(a, m, g, dt: float) -> None:
+    """Complementary filters: acceleration integrated, corrected by pressure altitude and by pitot."""
     w = g.vertical_bandwidth
     cos_theta = math.cos(m.theta)
     up = m.ax*math.sin(m.theta) - (m.ay*math.sin(m.phi) + m.az*math.cos(m.phi))*cos_theta - G0
     error = m.altitude - a.altitude
     a.altitude += dt*(a.climb_rate + 2.0*g.vertical_damping*w*error)
     a.climb_rate += dt*(up + w*w*error)
+    a.airspeed += dt*(airspeed_rate(m, G0) + g.airspeed_bandwidth*(m.airspeed - a.airspeed))
 
 
 @kernel
-def climb_command(a, m, t, adv, g) -> float:
-    """Climb rate asked for [m/s]; it yields where the airspeed nears its limit."""
+def climb_command(a, t, adv, g, dt: float) -> float:
+    """Climb rate asked for [m/s], slewed; it yields where the airspeed nears its limit."""
     wanted = t.climb_rate
     if t.pitch_mode == 1.0:
         wanted = g.K_altitude*(t.altitude - a.altitude)
-    spare = g.K_speed_priority*(m.airspeed - adv.airspeed_limit - g.airspeed_margin)
-    return clip(min(wanted, spare), -g.climb_max, g.climb_max)
+    spare = g.K_speed_priority*(a.airspeed - adv.airspeed_limit - g.airspeed_margin)
+    slew = g.climb_slew*dt
+    a.climb_command += clip(clip(min(wanted, spare), -g.climb_max, g.climb_max) - a.climb_command, -slew, slew)
+    return a.climb_command
 
 
 @kernel
@@ -175,7 +186,7 @@ def hold_airspeed(a, c, m, t, adv, g, climb: float, dt: float) -> None:
     """Both power levers."""
     wanted = t.throttle
     if t.speed_mode == 1.0:
-        error = max(t.airspeed, adv.airspeed_limit + g.airspeed_margin) - m.airspeed
+        error = max(t.airspeed, adv.airspeed_limit + g.airspeed_margin) - a.airspeed
         wanted = a.throttle_trim + g.K_airspeed*error + g.K_throttle_climb*climb
         rate = g.K_airspeed_integral*error*dt
         a.throttle_trim = integrated(a.throttle_trim, rate, wanted, g.throttle_min, g.throttle_max)
@@ -191,11 +202,12 @@ def hold_bank(a, c, m, t, adv, g, scale: float, dt: float) -> None:
     if t.roll_mode == 1.0:
         wanted = math.atan(airspeed_of(m)*g.K_heading*wrapped(t.heading - m.psi)/G0)
     limit = max(min(g.bank_max, adv.bank_limit), 0.0)
-    step = g.bank_rate*dt
-    a.bank_command += clip(clip(wanted, -limit, limit) - a.bank_command, -step, step)
+    left = clip(wanted, -limit, limit) - a.bank_command
+    slew = g.bank_rate*dt
+    a.bank_command += clip(left, -slew, slew)
     error = m.phi - a.bank_command
     wanted = a.aileron_trim + scale*(g.K_phi*error + g.K_p*m.p)
-    rate = scale*g.K_phi_integral*error*dt
+    rate = scale*g.K_phi_integral*error*dt if abs(left) <= slew else 0.0  # a lag behind the slew is no lack of trim
     a.aileron_trim = integrated(a.aileron_trim, rate, wanted, -g.aileron_max, g.aileron_max)
     c.aileron = clip(wanted, -g.aileron_max, g.aileron_max)
 
@@ -227,11 +239,11 @@ def step(autopilot, command, measurement, target, advisory, gains, dt):  # type:
         a, c, m, t, adv = autopilot[i], command[i], measurement[i], target[i], advisory[i]
         g = gains[i if len(gains) > 1 else 0]
         if a.engaged == 0.0:
-            engage(a, m)
+            engage(a, m, t, g)
         qbar = 0.5*air_density(m)*airspeed_of(m)*airspeed_of(m)
         scale = clip(g.qbar_reference/qbar, g.scale_min, g.scale_max)
-        vertical_speed(a, m, g, dt)
-        climb = 0.0 if t.pitch_mode == 0.0 else climb_command(a, m, t, adv, g)
+        navigate(a, m, g, dt)
+        climb = 0.0 if t.pitch_mode == 0.0 else climb_command(a, t, adv, g, dt)
         theta = pitch_command(a, m, t, adv, g, climb, scale, dt)
         hold_pitch(a, c, m, adv, g, theta, scale, dt)
         hold_airspeed(a, c, m, t, adv, g, climb, dt)

@@ -16,12 +16,11 @@ Merret, Hossain & Bragg (AIAA 2002-0814) protect the same variables; the closed-
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 from numpy.typing import NDArray
 
-from controllers.kernels import alpha_rate, clip, positive_part
+from controllers.kernels import airspeed_rate, alpha_rate, clip, positive_part
 from controllers.parameters import read_parameters
 from icing_env.atmosphere import G0
 from icing_env.jit import entry, kernel
@@ -71,10 +70,8 @@ def elevator_at_limit(a, m, e, frame, g) -> float:
 @kernel
 def airspeed_lack(a, m, g) -> float:
     """How far the predicted airspeed is below its limit [m/s], 0 above it."""
-    sin_a, cos_a = math.sin(m.alpha), math.cos(m.alpha)
-    rate = m.ax*cos_a + m.az*sin_a + G0*(
-        math.cos(m.theta)*math.cos(m.phi)*sin_a - math.sin(m.theta)*cos_a)
-    return positive_part(a.airspeed_limit - m.airspeed - g.lead_airspeed*rate, g.airspeed_round)
+    predicted = m.airspeed + g.lead_airspeed*airspeed_rate(m, G0)
+    return positive_part(a.airspeed_limit - predicted, g.airspeed_round)
 
 
 @kernel

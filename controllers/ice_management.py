@@ -11,7 +11,7 @@ ice, operate the ice protection, protect the envelope, advise the crew.
 * alpha_limit = alpha_stall (less with flap) - shift * severity - margin
 * V_s = sqrt(2 m g/(rho S CL_max)), CL_max = CL at alpha_stall, clean, + flap, less a loss per severity;
   airspeed_limit = factor V_s
-* bank_limit = acos(1/n_max), n_max = (V/airspeed_limit)^2
+* bank_limit = acos(1/n_max), n_max = (V/(factor V_s))^2
 * flap_limit: intermediate flap while tail ice is suspected, until the ice is gone
 """
 
@@ -52,6 +52,8 @@ IMS_TUNING_FIELDS: list[Field] = [
     ("CL_max_flap", "1/rad", "maximum lift coefficient gained per flap angle"),
     ("stall_factor_clean", "1", "airspeed limit over stall speed, clean"),
     ("stall_factor_iced", "1", "airspeed limit over stall speed, ice detected"),
+    ("bank_factor_clean", "1", "airspeed over stall speed at which no bank is left, clean"),
+    ("bank_factor_iced", "1", "the same, ice detected"),
     ("bank_min", "rad", "bank that is always allowed"),
     ("bank_max", "rad", "bank that is never exceeded"),
     ("flap_full", "rad", "flap allowed without tail ice"),
@@ -142,7 +144,8 @@ def limit_envelope(a, m, frame, g) -> None:
     stall = math.sqrt(2.0*frame.mass*G0/(air_density(m)*frame.wing_area*lift))
     iced = min(a.severity/g.detect_severity, 1.0)
     a.airspeed_limit = stall*(g.stall_factor_clean + (g.stall_factor_iced - g.stall_factor_clean)*iced)
-    ratio = max(m.airspeed, 1.0)/a.airspeed_limit
+    level = stall*(g.bank_factor_clean + (g.bank_factor_iced - g.bank_factor_clean)*iced)
+    ratio = max(m.airspeed, 1.0)/level
     a.bank_limit = clip(math.acos(1.0/max(ratio*ratio, 1.0)), g.bank_min, g.bank_max)
 
 

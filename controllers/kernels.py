@@ -54,6 +54,14 @@ def airspeed_of(m) -> float:
 
 
 @kernel
+def airspeed_rate(m, gravity: float) -> float:
+    """Rate of the airspeed [m/s2] in still air: specific force along the air stream, and gravity."""
+    sine, cosine = math.sin(m.alpha), math.cos(m.alpha)
+    return m.ax*cosine + m.az*sine + gravity*(
+        math.cos(m.theta)*math.cos(m.phi)*sine - math.sin(m.theta)*cosine)
+
+
+@kernel
 def alpha_rate(m, gravity: float) -> float:
     """Rate of the angle of attack [rad/s] from rates, specific force and attitude.
 
