@@ -128,7 +128,9 @@ def advance_protection(s, p, command, dt):  # type: ignore[no-untyped-def]
         inflate_vtail_struts(s, p)
         s.boot_age_vtail_struts = 0.0
         s.boot_cycles += 1.0
-    s.boot_was_wing, s.boot_was_tail, s.boot_was_vtail_struts = float(wing), float(tail), float(fin)
+    s.boot_was_wing = 1.0 if wing else 0.0
+    s.boot_was_tail = 1.0 if tail else 0.0
+    s.boot_was_vtail_struts = 1.0 if fin else 0.0
     heat_propeller(s, p, command.prop_heat > 0.5 and p.prop_heat_failed == 0.0, dt)
 
 

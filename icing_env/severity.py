@@ -29,8 +29,8 @@ LATERAL = (
 BLUFF = ("vtail", "struts", "propeller", "other")
 
 SEVERITY_PARAMETERS: list[Field] = [
-    *((f"k_{c}_{s}", "1", f"change of {c} per eta of the {s}, relative") for c in LONGITUDINAL for s in ("wing", "htail")),
-    *((f"k_{c}_{s}", "1", f"change of {c} per eta of the {s}, relative") for c in LATERAL for s in ("wing", "vtail")),
+    *((f"k_{c}_{s}", "1", f"relative change of {c} per eta, {s}") for c in LONGITUDINAL for s in ("wing", "htail")),
+    *((f"k_{c}_{s}", "1", f"relative change of {c} per eta, {s}") for c in LATERAL for s in ("wing", "vtail")),
     *((f"k_CD_parasite_{s}", "1", f"drag coefficient added per eta of {s}") for s in BLUFF),
     ("k_alpha_stall_wing", "rad", "fall of a half wing's stall angle per saturated eta"),
     ("k_alpha_tail_stall_htail", "1", "relative change of the tail's stall angle per saturated eta"),

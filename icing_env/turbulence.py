@@ -153,12 +153,18 @@ def put_rotation(s, p, airspeed):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def uniform16(word):  # type: ignore[no-untyped-def]
+    """Uniform deviate in (0, 1) of a 16-bit word."""
+    return (float(np.int64(word)) + 0.5) / 65536.0
+
+
+@kernel
 def advance_translation(s, sigma, airspeed, dt):  # type: ignore[no-untyped-def]
     """Advance the filters of u, v, w (one Philox block: 32 bits a noise, 16 for each pair's small second noise)."""
     length_uv, length_w, ratio = scales(s.altitude)
     a, b, c, d = words4(s.seed, STREAM_TURBULENCE, s.step, 0)
-    v2, w2 = normal((float(np.int64(d & _W16)) + 0.5) / 65536.0), normal((float(np.int64(d >> _SHIFT16)) + 0.5) / 65536.0)
-    v1, w1 = normal(uniform(b)), normal(uniform(c))
+    v1, v2 = normal(uniform(b)), normal(uniform16(d & _W16))
+    w1, w2 = normal(uniform(c)), normal(uniform16(d >> _SHIFT16))
     tau = airspeed * dt / length_uv
     decay, l11, l21, l22 = pair_noise(tau)
     sigma_uv = ratio * sigma
