@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 
+from icing_env.accretion import add_severity
 from icing_env.jit import kernel
 from icing_env.types import Field
 
@@ -51,7 +52,7 @@ def run_back(s, p, cleared):  # type: ignore[no-untyped-def]
     if s.temperature < 273.15 and cleared > 0.0:
         mass = p.boot_runback_share * cleared
         s.ice_mass_other += mass
-        s.eta_other += p.runback_severity * mass * max(1.0 - s.eta_other / p.eta_saturation_other, 0.0)
+        s.eta_other = add_severity(s.eta_other, p.runback_severity * mass, p.eta_saturation_other)
 
 
 @kernel
