@@ -39,7 +39,7 @@ def airframe_from(parameters: np.ndarray | Mapping[str, float]) -> np.ndarray:
     present = (parameters.dtype.names or ()) if is_array else parameters.keys()
     missing = [name for name in AIRFRAME.names or () if name not in present]
     if missing:
-        raise InputError(f"airframe: field {missing[0]!r} is missing; an observer needs {', '.join(AIRFRAME.names or ())}")
+        raise InputError(f"airframe: field '{missing[0]}' is missing; needed: {', '.join(AIRFRAME.names or ())}")
     rows = np.atleast_1d(parameters).shape[0] if is_array else 1
     airframe = np.zeros(rows, AIRFRAME)
     for name in AIRFRAME.names or ():

@@ -29,7 +29,7 @@ __all__ = ["OBSERVER", "init", "step"]
 
 @kernel
 def advance_filters(ob, tn, dt):  # type: ignore[no-untyped-def]
-    """f and zeta of every channel over one sample (RK4), then the rows of now become those of a sample ago."""
+    """f and zeta of every channel, and what the accelerometers feel, over one sample (RK4)."""
     for channel in range(6):
         rate = tn["d"][channel] / tn["n"][channel]
         for i in range(FIRST[channel], FIRST[channel] + COUNT[channel]):
@@ -37,6 +37,9 @@ def advance_filters(ob, tn, dt):  # type: ignore[no-untyped-def]
         before = ob["rest_before"][channel] + rate * ob["y_before"][channel]
         now = ob["rest"][channel] + rate * ob["y"][channel]
         ob["zeta"][channel] = filter_step(ob["zeta"][channel], before, now, rate, dt)
+        a = ACCELEROMETER[channel]
+        if a >= 0:
+            ob["felt_filtered"][a] = filter_step(ob["felt_filtered"][a], ob["felt_before"][a], ob["felt"][a], rate, dt)
 
 
 @kernel
@@ -50,6 +53,10 @@ def remember(ob, seat):  # type: ignore[no-untyped-def]
         ob["rest_before"][i], ob["y_before"][i] = ob["rest"][i], ob["y"][i]
         if seat:
             ob["zeta"][i] = ob["y"][i]
+    for i in range(3):
+        ob["felt_before"][i] = ob["felt"][i]
+        if seat:
+            ob["felt_filtered"][i] = 0.0
 
 
 @kernel
@@ -74,9 +81,10 @@ def learn_all(ob, tn, longitudinal, lateral, lively, dt):  # type: ignore[no-unt
         good &= learn(theta, b3, gain, first, packed, m, ob["filtered"], 1.0, target, information, kappa)
         if ACCELEROMETER[c] >= 0:
             a = ACCELEROMETER[c]
-            target, factor = ob["accelerometer"][a], ob["factor"][a]
+            factor = ob["factor"][a] * tn["d"][c] / tn["n"][c]
+            target = ob["felt_filtered"][a] * factor
             information = heard[c] / (tn["accelerometer"][a] * tn["accelerometer"][a])
-            good &= learn(theta, b3, gain, first, packed, m, ob["row"], factor, target, information, kappa)
+            good &= learn(theta, b3, gain, first, packed, m, ob["filtered"], factor, target, information, kappa)
         k0 = tn["k0"][c]
         forget(b3, ob["scale"], first, packed, m, k0 * wander[c], k0 * wander_first[c], tn["q0"][c])
     return good

@@ -20,6 +20,11 @@ f = -S2'/S1, Pi = S3 - S2' S2/S1 = B3^-1 and zeta = xhat - f' thetahat; then Sig
     Pidot   = (1 - gamma^-2) Q,                  Q = f f'/n^2 + a_a a_a'/n_a^2 (so that gamma* = 1)
     thetahatdot = Pi^-1 [f (y - zeta - f' thetahat)/n^2 + a_a (y_a - a_a' thetahat)/n_a^2].
 
+The accelerometer's row is put behind the same filter, both sides of it, before it is learned from: with a_a = F a,
+    y_a = F a' theta + n_a v   ->   F (d/n) f' theta = F (d/n) phi,   phidot = y_a/F - (d/n) phi,
+which keeps its information where the aircraft moves and leaves the vanes' noise out of the regressors (unfiltered,
+0.1 deg of noise in alpha lowers CL_alpha by 4 %). So one f serves both rows of a channel.
+
 The filters advance by RK4 with inputs interpolated to the half step (`filter_step`). The equations of Pi and
 thetahat are stiff (rates of 1e5/s in a rudder doublet, where RK4 needs less than 2.8/h), but with f held over the
 sample they have a solution in closed form, which `learn` applies: positive definite for every step size exactly
@@ -50,7 +55,7 @@ def filter_step(x: float, u0: float, u1: float, rate: float, dt: float) -> float
 
 @kernel
 def shrink(strength: float, kappa: float) -> float:
-    """(1 + kappa s)^(-1/kappa): what is left of a residual after a sample that carries the information s = dt f'B f/n^2.
+    """(1 + kappa s)^(-1/kappa): what a sample of information s leaves of a residual, s = dt f'B f/n^2.
 
     kappa = 1 - gamma^-2. It is 1/(1 + s) for the Kalman filter (gamma infinite) and exp(-s) at gamma = 1.
     The caller has checked that 1 + kappa s > 0.

@@ -18,7 +18,7 @@ REFERENCE_TEMPERATURE = 288.15  # K: only the density, pressure over temperature
 
 
 def airframe_of_record(record: FlightRecord, airframe: NDArray[np.void] | None) -> NDArray[np.void]:
-    """One AIRFRAME row: `airframe`, or the published one, with the mass, inertia and geometry that the record states."""
+    """One AIRFRAME row: `airframe` or the published one, mass, inertia and geometry as the record states."""
     aircraft = airframe_from(published_airframe() if airframe is None else airframe)[:1].copy()
     meta = record.meta
     if meta.mass is not None:

@@ -23,7 +23,8 @@ OBSERVER = np.dtype([
     ("row", "f8", (26,)), ("row_before", "f8", (26,)),  # regressors now and a sample ago
     ("rest", "f8", (6,)), ("rest_before", "f8", (6,)),  # b now and a sample ago
     ("y", "f8", (6,)), ("y_before", "f8", (6,)),  # measured states now and a sample ago
-    ("accelerometer", "f8", (3,)), ("factor", "f8", (3,)),  # see hinf_rows
+    ("felt", "f8", (3,)), ("felt_before", "f8", (3,)), ("factor", "f8", (3,)),  # from the accelerometers, see hinf_rows
+    ("felt_filtered", "f8", (3,)),  # `felt` behind the observer's filter
     ("gain", "f8", (6,)), ("deviation", "f8", (26,)),  # scratch; standard errors
     ("mean", "f8", (7,)), ("energy", "f8", (5,)),  # of the excitation measures
     ("excess_drag", "f8"),
@@ -40,8 +41,10 @@ def clean_values(airframe: np.ndarray) -> np.ndarray:
     af = airframe_from(airframe)
     alpha = af["CZ_0"] / (af["CX_0"] - af["CZ_alpha"])
     drag = -(af["CX_0"] + alpha * (af["CX_alpha"] + alpha * af["CX_alpha2"])) / np.cos(alpha)
-    own = {"CD_0": drag, "CL_0": -af["CZ_0"], "CL_alpha": af["CX_0"] - af["CZ_alpha"], "CL_elevator": -af["CZ_elevator"],
-           "CL_q": -af["CZ_q"]}
+    own = {
+        "CD_0": drag, "CL_0": -af["CZ_0"], "CL_alpha": af["CX_0"] - af["CZ_alpha"],
+        "CL_q": -af["CZ_q"], "CL_elevator": -af["CZ_elevator"],
+    }  # fmt: skip
     zero = np.zeros(len(af))
     names = af.dtype.names or ()
     return np.stack([own.get(n, af[n] if n in names else zero) for n in PARAMETER_NAMES], axis=1)

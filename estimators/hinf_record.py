@@ -89,9 +89,9 @@ def identify(
 ) -> dict[str, Estimate]:
     """Derivatives by name at the end of the record; arguments and errors as for `history`.
 
-    The standard error is that of least squares on the rows that the observer learned from (regressors behind its
-    filter, or the accelerometer's), corrected for coloured residuals: the scatter to be expected from what the record
-    does not explain. It is not B3's, which rests on the tuning alone (`History.parameter`).
+    The standard error is that of least squares on the rows that the observer learned from (behind its filter; the
+    accelerometer's where there is one), corrected for coloured residuals: the scatter to be expected from what the
+    record does not explain. It is not B3's, which rests on the tuning alone (`History.parameter`).
     """
     record = check(record)
     grid = common_grid(record)
@@ -118,11 +118,8 @@ def _fit(run: History, c: int) -> Fit:
     """Least squares on the rows of one channel, for residuals and their colour."""
     part, memory = slice(FIRST[c], FIRST[c] + COUNT[c]), run.memory
     good = (run.estimate["health"] == 1.0) & (memory["seated"] == 1.0)
-    a = ACCELEROMETER[c]
-    if a >= 0:
-        rows, target = memory["row"][:, part] * memory["factor"][:, a, None], memory["accelerometer"][:, a]
-    else:
-        rows, target = memory["filtered"][:, part], memory["y"][:, c] - memory["zeta"][:, c]
+    a, rows = ACCELEROMETER[c], memory["filtered"][:, part]
+    target = memory["felt_filtered"][:, a] if a >= 0 else memory["y"][:, c] - memory["zeta"][:, c]
     return least_squares(np.where(good[:, None], rows, 0.0), np.where(good, target, 0.0))
 
 
@@ -162,5 +159,5 @@ def _why_not_drag(grid: Grid, run: History) -> str:
     lift = run.memory["theta"][-1, 1] + run.memory["theta"][-1, 2] * np.asarray(grid.values["alpha"])
     nearest = float(np.nanmin(np.abs(lift)))
     if nearest > EXTRAPOLATED:
-        return f"lift coefficients stay above {nearest:.2f}: zero lift is an extrapolation along the clean aircraft's polar"
+        return f"lift coefficients stay above {nearest:.2f}: zero lift is an extrapolation along the clean polar"
     return ""

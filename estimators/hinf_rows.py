@@ -2,9 +2,9 @@
 
 Standard rigid-body equations (Klein and Morelli, Aircraft System Identification, chapter 3), Ixz = + int x z dm.
 Everything that is not an estimated coefficient is formed from measured quantities and goes into b.
-They leave, in the order of PARAMETER_NAMES, the regressors a of the six state equations in row["row"], the rest
-in row["rest"], the states as measured in row["y"], and for drag, lift and side force what the accelerometer says
-(row["accelerometer"]) with the factor by which the same regressors enter it (row["factor"]).
+They leave, in the order of PARAMETER_NAMES, the regressors a of the six state equations in row["row"], the rest b in
+row["rest"] and the states as measured in row["y"]; for drag, lift and side force also row["felt"], what the
+accelerometer says of the same a'theta, and row["factor"], by which it must be multiplied to be an acceleration.
 """
 
 from __future__ import annotations
@@ -58,21 +58,20 @@ def force_rows(ob, m, af):  # type: ignore[no-untyped-def]
     row[0] = -k * ca * ca * cb
     rest[0] = ca * cb * known + sb * m["ay"] + sa * cb * m["az"] + GRAVITY * (
         sb * sp * ct + sa * cb * cp * ct - ca * cb * st)
-    ob["accelerometer"][0], ob["factor"][0] = m["ax"] - known, 1.0 / (ca * cb)
+    ob["felt"][0], ob["factor"][0] = (m["ax"] - known) * ca * cb, 1.0 / (ca * cb)
 
     lift = -k / (v * cb)
     row[1], row[2], row[3], row[4] = lift, lift * alpha, lift * half_chord * q, lift * m["elevator"]
     rest[1] = q - sb / cb * (p * ca + r * sa) + (
         GRAVITY * (sa * st + ca * cp * ct) - thrust * sa) / (v * cb)
-    ob["accelerometer"][1] = m["az"] * ca - (m["ax"] - thrust) * sa
-    ob["factor"][1] = v * cb
+    ob["felt"][1], ob["factor"][1] = (m["az"] * ca - (m["ax"] - thrust) * sa) / (v * cb), v * cb
 
     side = k * cb / v
     row[9], row[10], row[11] = side, side * beta, side * half_span * p
     row[12], row[13] = side * half_span * r, side * m["rudder"]
     rest[3] = p * sa - r * ca + (-sb * (m["ax"] * ca + m["az"] * sa) + GRAVITY * (
         ca * sb * st + cb * sp * ct - sa * sb * cp * ct)) / v
-    ob["accelerometer"][2], ob["factor"][2] = m["ay"], v / cb
+    ob["felt"][2], ob["factor"][2] = m["ay"] * cb / v, v / cb
     ob["y"][0], ob["y"][1], ob["y"][3] = v, alpha, beta
     return qbar
 
