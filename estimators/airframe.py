@@ -35,13 +35,15 @@ def airframe_from(parameters: np.ndarray | Mapping[str, float]) -> np.ndarray:
 
     Returns an `AIRFRAME` array with as many rows. Raises InputError naming the first field that is missing.
     """
-    is_array = isinstance(parameters, np.ndarray)
-    present = (parameters.dtype.names or ()) if is_array else parameters.keys()
-    missing = [name for name in AIRFRAME.names or () if name not in present]
+    names = AIRFRAME.names or ()
+    if isinstance(parameters, np.ndarray):
+        rows, present = parameters.size, parameters.dtype.names or ()
+    else:
+        rows, present = 1, tuple(parameters)
+    missing = [name for name in names if name not in present]
     if missing:
-        raise InputError(f"airframe: field '{missing[0]}' is missing; needed: {', '.join(AIRFRAME.names or ())}")
-    rows = np.atleast_1d(parameters).shape[0] if is_array else 1
+        raise InputError(f"airframe: field '{missing[0]}' is missing; needed: {', '.join(names)}")
     airframe = np.zeros(rows, AIRFRAME)
-    for name in AIRFRAME.names or ():
+    for name in names:
         airframe[name] = parameters[name]
     return airframe

@@ -28,7 +28,7 @@ __all__ = ["OBSERVER", "init", "step"]
 
 
 @kernel
-def advance_filters(ob, tn, dt):  # type: ignore[no-untyped-def]
+def advance_filters(ob: Any, tn: Any, dt: float) -> None:
     """f and zeta of every channel, and what the accelerometers feel, over one sample (RK4)."""
     for channel in range(6):
         rate = tn["d"][channel] / tn["n"][channel]
@@ -43,7 +43,7 @@ def advance_filters(ob, tn, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def remember(ob, seat):  # type: ignore[no-untyped-def]
+def remember(ob: Any, seat: bool) -> None:
     """Keep this sample's rows; with `seat`, start the filters here: xhat = y, nothing filtered yet."""
     for i in range(26):
         ob["row_before"][i] = ob["row"][i]
@@ -60,7 +60,7 @@ def remember(ob, seat):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def learn_all(ob, tn, longitudinal, lateral, lively, dt):  # type: ignore[no-untyped-def]
+def learn_all(ob: Any, tn: Any, longitudinal: float, lateral: float, lively: float, dt: float) -> bool:
     """All six channels over one sample: state row, accelerometer row, wandering. False if any of them failed.
 
     Gated channels take data in, and wander, only as far as they are excited.
@@ -91,7 +91,7 @@ def learn_all(ob, tn, longitudinal, lateral, lively, dt):  # type: ignore[no-unt
 
 
 @kernel
-def healthy(ob) -> bool:  # type: ignore[no-untyped-def]
+def healthy(ob: Any) -> bool:
     """True while every estimate is finite and every variance positive."""
     total = 0.0
     lowest = 1.0
@@ -104,7 +104,7 @@ def healthy(ob) -> bool:  # type: ignore[no-untyped-def]
 
 
 @kernel
-def report(ob, est, longitudinal, lateral):  # type: ignore[no-untyped-def]
+def report(ob: Any, est: Any, longitudinal: float, lateral: float) -> None:
     """Write estimates, standard errors, excess drag and excitation; health is 1. Order: PARAMETER_NAMES."""
     th, sd = ob["theta"], ob["deviation"]
     for i in range(26):
@@ -135,7 +135,7 @@ def report(ob, est, longitudinal, lateral):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def observe(ob, est, m, af, tn, dt):  # type: ignore[no-untyped-def]
+def observe(ob: Any, est: Any, m: Any, af: Any, tn: Any, dt: float) -> None:
     """One aircraft, one sample. See `step`."""
     est["health"] = 0.0
     if ob["failed"] > 0.0:

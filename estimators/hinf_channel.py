@@ -38,6 +38,7 @@ The state is taken to move with the parameter through the filter's memory n/d, s
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from icing_env.jit import kernel
 
@@ -68,7 +69,10 @@ def shrink(strength: float, kappa: float) -> float:
 
 
 @kernel
-def learn(theta, b3, gain, first, packed, m, row, factor, target, information, kappa):  # type: ignore[no-untyped-def]
+def learn(
+    theta: Any, b3: Any, gain: Any, first: int, packed: int, m: int,
+    row: Any, factor: float, target: float, information: float, kappa: float,
+) -> bool:
     """Advance thetahat and B3 over one sample of one row of data, r = factor row[first:first + m], in place.
 
     With r held and `information` = dt/n^2, the equations Bdot = -kappa B r r'B/n^2 and
@@ -101,7 +105,9 @@ def learn(theta, b3, gain, first, packed, m, row, factor, target, information, k
 
 
 @kernel
-def forget(b3, scale, first, packed, m, wander, wander_first, q0):  # type: ignore[no-untyped-def]
+def forget(
+    b3: Any, scale: Any, first: int, packed: int, m: int, wander: float, wander_first: float, q0: float
+) -> None:
     """Add K0 dt to the diagonal of B3, never beyond its starting value scale^2/q0 (no wind-up in calm air).
 
     wander: K0 dt per scale^2 of all parameters but the first of the channel, wander_first: of that one.

@@ -8,18 +8,20 @@ hands off in turbulence, about 0.5 in a doublet. The idea of an excitation measu
 
 from __future__ import annotations
 
+from typing import Any
+
 from icing_env.jit import kernel
 
 
 @kernel
-def activity(ob, slot, weight, signal):  # type: ignore[no-untyped-def]
+def activity(ob: Any, slot: int, weight: float, signal: float) -> float:
     """Square of a signal's departure from its own slow mean (a first-order low pass, weight = dt/window)."""
     ob["mean"][slot] += weight * (signal - ob["mean"][slot])
-    return (signal - ob["mean"][slot]) ** 2
+    return float((signal - ob["mean"][slot]) ** 2)
 
 
 @kernel
-def excite(ob, m, af, window, dt):  # type: ignore[no-untyped-def]
+def excite(ob: Any, m: Any, af: Any, window: float, dt: float) -> None:
     """Recursive energies of the moments that the surfaces cause, of those that the motion causes, and of alpha.
 
     Moments as angular accelerations of the clean aircraft. The first sample (not seated) sets the means.
@@ -48,7 +50,7 @@ def gate(share: float, low: float, high: float) -> float:
 
 
 @kernel
-def shares(ob, tn, af):  # type: ignore[no-untyped-def]
+def shares(ob: Any, tn: Any, af: Any) -> tuple[float, float, float]:
     """Excitation shares (longitudinal, lateral) and the liveliness of alpha (0..1), from the energies."""
     energy = ob["energy"]
     floor = tn["control_floor"]

@@ -10,6 +10,7 @@ accelerometer says of the same a'theta, and row["factor"], by which it must be m
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from icing_env.jit import kernel
 
@@ -28,14 +29,14 @@ PARAMETER_NAMES = (
 
 
 @kernel
-def clean_zero_lift_drag(af) -> float:  # type: ignore[no-untyped-def]
+def clean_zero_lift_drag(af: Any) -> float:
     """Drag coefficient of the clean aircraft at zero lift: CL = 0 and CX there give CD = -CX/cos(alpha_0)."""
     alpha = af["CZ_0"] / (af["CX_0"] - af["CZ_alpha"])
-    return -(af["CX_0"] + alpha * (af["CX_alpha"] + alpha * af["CX_alpha2"])) / math.cos(alpha)
+    return float(-(af["CX_0"] + alpha * (af["CX_alpha"] + alpha * af["CX_alpha2"])) / math.cos(alpha))
 
 
 @kernel
-def force_rows(ob, m, af):  # type: ignore[no-untyped-def]
+def force_rows(ob: Any, m: Any, af: Any) -> float:
     """Drag, lift and side force: states airspeed, alpha, beta; accelerometers x, z, y.
 
     Drag:  a_x = k (CX_clean(alpha) - (CD_0 - CD_0,clean) cos alpha) + T/m, k = qbar S/m. Lift-dependent drag keeps the
@@ -73,11 +74,11 @@ def force_rows(ob, m, af):  # type: ignore[no-untyped-def]
         ca * sb * st + cb * sp * ct - sa * sb * cp * ct)) / v
     ob["felt"][2], ob["factor"][2] = m["ay"] * cb / v, v / cb
     ob["y"][0], ob["y"][1], ob["y"][3] = v, alpha, beta
-    return qbar
+    return float(qbar)
 
 
 @kernel
-def moment_rows(ob, m, af, qbar):  # type: ignore[no-untyped-def]
+def moment_rows(ob: Any, m: Any, af: Any, qbar: float) -> None:
     """Pitch, roll and yaw. The states p - (Ixz/Ixx) r and r - (Ixz/Izz) p leave one moment in each equation.
 
     Iyy qdot = qbar S c Cm + (Izz - Ixx) p r + Ixz (r^2 - p^2);
@@ -105,7 +106,7 @@ def moment_rows(ob, m, af, qbar):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def readable(m) -> bool:  # type: ignore[no-untyped-def]
+def readable(m: Any) -> bool:
     """True if every channel the rows need is finite and the air data are physical."""
     total = (
         m["alpha"] + m["beta"] + m["p"] + m["q"] + m["r"] + m["phi"] + m["theta"] + m["ax"] + m["ay"] + m["az"]

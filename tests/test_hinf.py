@@ -6,19 +6,16 @@ from functools import cache
 
 import numpy as np
 import pytest
-from flights import flight_data
 from small_aircraft import fly, noisy
 
-from estimators import hinf, hinf_record
+from estimators import hinf
 from estimators.airframe import airframe_from, published_airframe
-from estimators.equation_error import identify as equation_error
 from estimators.hinf_channel import learn
 from estimators.hinf_memory import DIAGONAL, FIRST, PACKED, clean_values
 from estimators.hinf_rows import PARAMETER_NAMES
 from estimators.hinf_tuning import default_tuning, tuning_from
 from icing_env.configuration import folder
 from icing_env.errors import InputError
-from icing_env.record import read
 from icing_env.types import ESTIMATE, ESTIMATED_NAMES
 
 DT = 0.02
@@ -219,37 +216,6 @@ def test_an_unreadable_sample_is_flagged_and_does_not_spread(name: str) -> None:
         assert np.all(estimates[parameter][300:310] == estimates[parameter][299])
     truth = clean_values(published_airframe())[0, PARAMETER_NAMES.index("Cm_alpha")]
     assert estimates["Cm_alpha"][-1] == pytest.approx(truth, rel=0.02)
-
-
-BY_FIVE_PERCENT = ("Cm_alpha", "Cm_q", "Cm_elevator", "CL_alpha", "Cl_beta", "Cl_p", "Cl_aileron",
-                   "Cn_beta", "Cn_r", "Cn_rudder")  # fmt: skip
-
-
-@pytest.mark.parametrize("start", [0.4, 1.6])
-@pytest.mark.parametrize("name", ["totter_demo_data", "totter_pred_data", "totter_f1_017_data"])
-def test_recorded_flights_agree_with_equation_error(name: str, start: float) -> None:
-    record = read(flight_data(f"{name}.mat"))
-    reference, found = equation_error(record, "matched"), hinf_record.identify(record, start=start)
-    compared = 0
-    for derivative, estimate in found.items():
-        other = reference.get(derivative)
-        if not estimate.identifiable or other is None or not other.identifiable:
-            assert estimate.identifiable or estimate.why
-            continue
-        difference, compared = abs(estimate.estimate - other.estimate), compared + 1
-        limit = 0.05 * abs(other.estimate) if derivative in BY_FIVE_PERCENT else 2.0 * other.std_error
-        assert difference < limit, (derivative, estimate, other)
-    assert compared >= 7
-
-
-def test_history_starts_where_it_was_told() -> None:
-    record = read(flight_data("totter_demo_data.mat"))
-    history = hinf_record.history(record, start=0.4)
-    values, deviations = history.parameter("Cm_alpha")
-    assert values[0] == pytest.approx(0.4 * -1.31) and len(values) == len(record)
-    assert deviations[-1] < 0.2 * deviations[0]
-    with pytest.raises(InputError, match="Cm_alfa"):
-        history.parameter("Cm_alfa")
 
 
 def test_tuning_file_is_checked(tmp_path) -> None:
