@@ -12,6 +12,7 @@ Nothing grows without liquid water or at 0 C and above. Ice is also shed at rand
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from icing_env.jit import kernel
 from icing_env.random import STREAM_SHEDDING, uniform4
@@ -38,7 +39,7 @@ ACCRETION_PARAMETERS: list[Field] = [
 
 
 @kernel
-def glaze(n, peak, rime):  # type: ignore[no-untyped-def]
+def glaze(n: float, peak: float, rime: float) -> float:
     """Severity of ice of freezing fraction n over that of the worst: 0 at 0, 1 at `peak`, `rime` at 1; smooth."""
     if n <= peak:
         x = n / peak
@@ -48,7 +49,9 @@ def glaze(n, peak, rime):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def growth(s, p, speed, density, dt, diameter, area, length):  # type: ignore[no-untyped-def]
+def growth(
+    s: Any, p: Any, speed: float, density: float, dt: float, diameter: float, area: float, length: float
+) -> tuple[float, float, float]:
     """What a surface gains in dt: severity (before saturation), thickness (m), mass (kg)."""
     beta = catch(s.mvd, speed, diameter, density, viscosity_of_air(s.temperature))
     n = freezing_fraction(s.lwc, speed, beta, diameter, s.temperature, density)
@@ -58,7 +61,7 @@ def growth(s, p, speed, density, dt, diameter, area, length):  # type: ignore[no
 
 
 @kernel
-def add_severity(eta, gain, saturation):  # type: ignore[no-untyped-def]
+def add_severity(eta: float, gain: float, saturation: float) -> float:
     """Severity after a gain, approaching its saturation exponentially."""
     if eta >= saturation:
         return eta
@@ -66,7 +69,7 @@ def add_severity(eta, gain, saturation):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def kept(s, p, dt, thickness, index):  # type: ignore[no-untyped-def]
+def kept(s: Any, p: Any, dt: float, thickness: float, index: int) -> float:
     """Share of a surface's ice that wasting and random shedding leave in dt."""
     if thickness <= 0.0:
         return 1.0
@@ -86,7 +89,7 @@ def kept(s, p, dt, thickness, index):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def waste_ice(s, p, dt):  # type: ignore[no-untyped-def]
+def waste_ice(s: Any, p: Any, dt: float) -> None:
     """Melting, sublimation and natural shedding of every surface."""
     left = kept(s, p, dt, s.thickness_left_wing, 0)
     s.eta_left_wing *= left
@@ -119,7 +122,7 @@ def waste_ice(s, p, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def grow_wing(s, p, airspeed, density, dt):  # type: ignore[no-untyped-def]
+def grow_wing(s: Any, p: Any, airspeed: float, density: float, dt: float) -> None:
     """Growth on the two half wings, each by its own numbers."""
     gain, depth, mass = growth(
         s, p, airspeed, density, dt, p.edge_diameter_left_wing, p.frontal_area_left_wing, p.eta_length_left_wing
@@ -136,7 +139,7 @@ def grow_wing(s, p, airspeed, density, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def grow_tail(s, p, airspeed, density, dt):  # type: ignore[no-untyped-def]
+def grow_tail(s: Any, p: Any, airspeed: float, density: float, dt: float) -> None:
     """Growth on tailplane and fin."""
     gain, depth, mass = growth(
         s, p, airspeed, density, dt, p.edge_diameter_htail, p.frontal_area_htail, p.eta_length_htail
@@ -153,7 +156,7 @@ def grow_tail(s, p, airspeed, density, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def grow_others(s, p, airspeed, density, dt):  # type: ignore[no-untyped-def]
+def grow_others(s: Any, p: Any, airspeed: float, density: float, dt: float) -> None:
     """Growth on struts and gear, propellers (at the blades' speed) and the remaining parts."""
     gain, depth, mass = growth(
         s, p, airspeed, density, dt, p.edge_diameter_struts, p.frontal_area_struts, p.eta_length_struts
@@ -177,7 +180,7 @@ def grow_others(s, p, airspeed, density, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def advance_accretion(s, p, airspeed, density, dt):  # type: ignore[no-untyped-def]
+def advance_accretion(s: Any, p: Any, airspeed: float, density: float, dt: float) -> None:
     """Advance the ice of every surface; called on the slow clock (1 s).
 
     Args:

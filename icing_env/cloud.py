@@ -13,6 +13,7 @@ now, and is zero outside the envelope's temperatures and altitudes; so above 0 C
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from icing_env import atmosphere
 from icing_env.jit import kernel
@@ -57,7 +58,7 @@ INTERMITTENT_LWC = (
 
 
 @kernel
-def table(mvd, cold, diameters, contents, columns):  # type: ignore[no-untyped-def]
+def table(mvd: float, cold: float, diameters: tuple[float, ...], contents: tuple[float, ...], columns: int) -> float:
     """Bilinear value in a table at a diameter (um) and `cold` steps of 10 K below 0 C, held at the edges."""
     row = 0
     for i in range(1, len(diameters) - 1):
@@ -74,7 +75,7 @@ def table(mvd, cold, diameters, contents, columns):  # type: ignore[no-untyped-d
 
 
 @kernel
-def largest_content(mode, mvd, temperature):  # type: ignore[no-untyped-def]
+def largest_content(mode: int, mvd: float, temperature: float) -> float:
     """Largest mean liquid water content (kg/m3) over the reference extent, temperature held at the envelope's ends.
 
     Large drops: 0.30 g/m3 at 0 C falling to 0.20 at -25 C, of the size of Appendix O figures 1 and 4; assumed.
@@ -88,7 +89,7 @@ def largest_content(mode, mvd, temperature):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def knee(x, x0, x1, x2, f0, f1, f2):  # type: ignore[no-untyped-def]
+def knee(x: float, x0: float, x1: float, x2: float, f0: float, f1: float, f2: float) -> float:
     """Piecewise straight through three points, held outside."""
     x = min(max(x, x0), x2)
     if x <= x1:
@@ -97,7 +98,7 @@ def knee(x, x0, x1, x2, f0, f1, f2):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def extent_factor(mode, length):  # type: ignore[no-untyped-def]
+def extent_factor(mode: int, length: float) -> float:
     """Factor on the content for a cloud of a horizontal extent (m): Appendix C figures 3 and 6, held at their ends."""
     x = math.log(max(length, 1.0) / NAUTICAL_MILE)
     if mode == CONTINUOUS_MAXIMUM:
@@ -108,7 +109,7 @@ def extent_factor(mode, length):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def inside(mode, temperature, altitude):  # type: ignore[no-untyped-def]
+def inside(mode: int, temperature: float, altitude: float) -> bool:
     """True within the envelope's temperatures and altitudes (Appendix C figures 2 and 5; large drops to -25 C)."""
     feet = altitude / FOOT
     if temperature >= FREEZING or feet > 22000.0:
@@ -122,7 +123,7 @@ def inside(mode, temperature, altitude):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def begin_cloud(s, p, mode, length, share, size):  # type: ignore[no-untyped-def]
+def begin_cloud(s: Any, p: Any, mode: int, length: float, share: float, size: float) -> None:
     """A new cloud of a length (m), with uniform deviates `share` and `size` for its content and drop diameter."""
     low, high = 100e-6, 200e-6
     if mode != LARGE_DROPS:
@@ -136,14 +137,14 @@ def begin_cloud(s, p, mode, length, share, size):  # type: ignore[no-untyped-def
 
 
 @kernel
-def begin_gap(s, length):  # type: ignore[no-untyped-def]
+def begin_gap(s: Any, length: float) -> None:
     """Clear air of a length (m)."""
     s.cloud_left = -length
     s.mvd = s.cloud_lwc_mean = 0.0
 
 
 @kernel
-def follow_track(s, p, mode, distance):  # type: ignore[no-untyped-def]
+def follow_track(s: Any, p: Any, mode: int, distance: float) -> None:
     """Move along clouds and gaps by a distance (m); cloud_left = 0 draws where a flight begins."""
     u, share, size, where = uniform4(s.seed, STREAM_CLOUD, s.step, 0)
     cloud = max(-math.log(u) * p.cloud_length_mean, SHORTEST)
@@ -163,7 +164,7 @@ def follow_track(s, p, mode, distance):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def advance_cloud(s, p, airspeed, dt):  # type: ignore[no-untyped-def]
+def advance_cloud(s: Any, p: Any, airspeed: float, dt: float) -> None:
     """Advance the cloud by airspeed dt; called on the slow clock (1 s).
 
     Args:

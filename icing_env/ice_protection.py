@@ -12,6 +12,7 @@ Propeller heat removes ice with a time constant and costs power while it is on.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from icing_env.accretion import add_severity
 from icing_env.jit import kernel
@@ -36,18 +37,18 @@ PROTECTION_PARAMETERS: list[Field] = [
 
 
 @kernel
-def left_by_boot(p, thickness, failed, reach):  # type: ignore[no-untyped-def]
+def left_by_boot(p: Any, thickness: float, failed: float, reach: float) -> float:
     """Share of a surface's ice left by one inflation that reaches the share `reach` of it."""
     if failed != 0.0:
         return 1.0
-    left = p.boot_residual
+    left: float = p.boot_residual
     if p.boot_thin_thickness > 0.0:
         left += (1.0 - left) * math.exp(-thickness / p.boot_thin_thickness)
     return 1.0 - reach * (1.0 - left)
 
 
 @kernel
-def run_back(s, p, cleared):  # type: ignore[no-untyped-def]
+def run_back(s: Any, p: Any, cleared: float) -> None:
     """Refreeze some of a cleared mass (kg) on the other parts."""
     if s.temperature < 273.15 and cleared > 0.0:
         mass = p.boot_runback_share * cleared
@@ -56,7 +57,7 @@ def run_back(s, p, cleared):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def inflate_wing(s, p):  # type: ignore[no-untyped-def]
+def inflate_wing(s: Any, p: Any) -> None:
     """One inflation of the wing boots."""
     left = left_by_boot(p, s.thickness_left_wing, p.boot_failed_left_wing, 1.0)
     right = left_by_boot(p, s.thickness_right_wing, p.boot_failed_right_wing, 1.0)
@@ -71,7 +72,7 @@ def inflate_wing(s, p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def inflate_tail(s, p):  # type: ignore[no-untyped-def]
+def inflate_tail(s: Any, p: Any) -> None:
     """One inflation of the tailplane boots."""
     left = left_by_boot(p, s.thickness_htail, p.boot_failed_htail, 1.0)
     cleared = (1.0 - left) * s.ice_mass_htail
@@ -82,7 +83,7 @@ def inflate_tail(s, p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def inflate_vtail_struts(s, p):  # type: ignore[no-untyped-def]
+def inflate_vtail_struts(s: Any, p: Any) -> None:
     """One inflation of the fin and strut boots."""
     fin = left_by_boot(p, s.thickness_vtail, p.boot_failed_vtail, 1.0)
     struts = left_by_boot(p, s.thickness_struts, p.boot_failed_struts, p.boot_share_struts)
@@ -97,13 +98,13 @@ def inflate_vtail_struts(s, p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def fires(on, was, age, cycle):  # type: ignore[no-untyped-def]
+def fires(on: bool, was: bool, age: float, cycle: float) -> bool:
     """True when a boot inflates now: its command rose, or is held and the cycle is over."""
     return on and (not was or age >= cycle)
 
 
 @kernel
-def advance_protection(s, p, command, dt):  # type: ignore[no-untyped-def]
+def advance_protection(s: Any, p: Any, command: Any, dt: float) -> None:
     """Obey the ice-protection commands for a step.
 
     Args:
@@ -136,7 +137,7 @@ def advance_protection(s, p, command, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def heat_propeller(s, p, on, dt):  # type: ignore[no-untyped-def]
+def heat_propeller(s: Any, p: Any, on: bool, dt: float) -> None:
     """Electric heat on the propellers for a step."""
     if on:
         s.heat_energy += p.prop_heat_power * dt

@@ -17,6 +17,8 @@ import numpy as np
 
 from icing_env.jit import kernel
 
+Word = np.uint64  # holds 32 bits in what follows
+
 # One stream for each use; a new use takes a new number.
 STREAM_TURBULENCE = 1
 STREAM_TURBULENCE_START = 2
@@ -33,7 +35,7 @@ _TWO_32 = 2.0**-32
 
 
 @kernel
-def philox(c0, c1, c2, c3, k0, k1):  # type: ignore[no-untyped-def]
+def philox(c0: Word, c1: Word, c2: Word, c3: Word, k0: Word, k1: Word) -> tuple[Word, Word, Word, Word]:
     """Ten rounds of Philox 4x32 (all arguments and results uint64 holding 32-bit words).
 
     Args:
@@ -56,22 +58,20 @@ def philox(c0, c1, c2, c3, k0, k1):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def words4(seed, stream, step, block):  # type: ignore[no-untyped-def]
+def words4(seed: int, stream: int, step: int, block: int) -> tuple[Word, Word, Word, Word]:
     """Four random 32-bit words (as uint64) of one (seed, stream, step, block), all integers >= 0."""
     key, time = np.uint64(seed), np.uint64(step)
-    return philox(
-        np.uint64(block), np.uint64(stream), time & _MASK, time >> _HALF, key & _MASK, key >> _HALF
-    )
+    return philox(np.uint64(block), np.uint64(stream), time & _MASK, time >> _HALF, key & _MASK, key >> _HALF)
 
 
 @kernel
-def uniform(word):  # type: ignore[no-untyped-def]
+def uniform(word: Word) -> float:
     """Uniform deviate in (0, 1), both ends excluded, of one 32-bit word."""
     return (float(np.int64(word)) + 0.5) * _TWO_32
 
 
 @kernel
-def normal(u):  # type: ignore[no-untyped-def]
+def normal(u: float) -> float:
     """Standard normal deviate with distribution value `u` in (2^-34, 1 - 2^-34): Wichura 1988, AS 241, PPND7.
 
     The form's third branch (tails below 1.4e-11) cannot be reached from a 32-bit uniform and is left out.
@@ -87,14 +87,14 @@ def normal(u):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def uniform4(seed, stream, step, block):  # type: ignore[no-untyped-def]
+def uniform4(seed: int, stream: int, step: int, block: int) -> tuple[float, float, float, float]:
     """Four independent uniform deviates in (0, 1)."""
     a, b, c, d = words4(seed, stream, step, block)
     return uniform(a), uniform(b), uniform(c), uniform(d)
 
 
 @kernel
-def normal4(seed, stream, step, block):  # type: ignore[no-untyped-def]
+def normal4(seed: int, stream: int, step: int, block: int) -> tuple[float, float, float, float]:
     """Four independent standard normal deviates."""
     a, b, c, d = words4(seed, stream, step, block)
     return normal(uniform(a)), normal(uniform(b)), normal(uniform(c)), normal(uniform(d))

@@ -14,6 +14,7 @@ With every eta zero, each value is bit for bit the clean one.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from icing_env.jit import kernel
 from icing_env.types import Field
@@ -40,19 +41,19 @@ SEVERITY_PARAMETERS: list[Field] = [
 
 
 @kernel
-def saturated(eta):  # type: ignore[no-untyped-def]
+def saturated(eta: float) -> float:
     """Severity as it acts on the stall: linear to 0.1, then towards 0.3 (SIS, correction of November 2002)."""
     return eta if eta <= 0.1 else 0.3 - 0.3297 * math.exp(-5.0 * eta)
 
 
 @kernel
-def factor(k1, eta1, k2, eta2, floor):  # type: ignore[no-untyped-def]
+def factor(k1: float, eta1: float, k2: float, eta2: float, floor: float) -> float:
     """Factor 1 + k1 eta1 + k2 eta2, at least `floor`."""
     return max(1.0 + (k1 * eta1 + k2 * eta2), floor)
 
 
 @kernel
-def iced_pitch(p, c, wing, tail):  # type: ignore[no-untyped-def]
+def iced_pitch(p: Any, c: Any, wing: float, tail: float) -> None:
     """Pitch-plane coefficients but for those that differ between the half wings."""
     low = p.ice_factor_floor
     c.CX_alpha = p.CX_alpha * factor(p.k_CX_alpha_wing, wing, p.k_CX_alpha_htail, tail, low)
@@ -67,7 +68,7 @@ def iced_pitch(p, c, wing, tail):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def iced_lateral(p, c, wing, fin):  # type: ignore[no-untyped-def]
+def iced_lateral(p: Any, c: Any, wing: float, fin: float) -> None:
     """Roll, yaw and side-force coefficients."""
     low = p.ice_factor_floor
     c.CY_beta = p.CY_beta * factor(p.k_CY_beta_wing, wing, p.k_CY_beta_vtail, fin, low)
@@ -87,7 +88,7 @@ def iced_lateral(p, c, wing, fin):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def iced_half_wings(s, p, c):  # type: ignore[no-untyped-def]
+def iced_half_wings(s: Any, p: Any, c: Any) -> None:
     """Lift slope, axial coefficient and stall angle of each half wing; the aircraft's are the means."""
     low, left, right, tail = p.ice_factor_floor, s.eta_left_wing, s.eta_right_wing, s.eta_htail
     c.CZ_alpha_left = p.CZ_alpha * factor(p.k_CZ_alpha_wing, left, p.k_CZ_alpha_htail, tail, low)
@@ -101,7 +102,7 @@ def iced_half_wings(s, p, c):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def iced_aircraft(s, p, c):  # type: ignore[no-untyped-def]
+def iced_aircraft(s: Any, p: Any, c: Any) -> None:
     """Fill the coefficients as they are now.
 
     Args:

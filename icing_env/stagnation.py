@@ -25,58 +25,60 @@ AIR_HEAT, PRANDTL = 1004.7, 0.711  # J/(kg K); air at 0 C
 
 
 @kernel
-def catch(mvd, speed, diameter, density, viscosity):  # type: ignore[no-untyped-def]
+def catch(mvd: float, speed: float, diameter: float, density: float, viscosity: float) -> float:
     """Collection efficiency at the stagnation line of a cylinder, 0..1 (SI arguments)."""
     inertia = WATER_DENSITY * mvd * mvd * speed / (18.0 * diameter * viscosity)
     if inertia <= 0.125:
         return 0.0
     reynolds = density * speed * mvd / viscosity
     reach = min(1.0 / (0.8388 + 0.001483 * reynolds + 0.1847 * math.sqrt(reynolds)), 1.0)
-    x = 1.4 * (reach * (inertia - 0.125)) ** 0.84
+    x = 1.4 * math.pow(reach * (inertia - 0.125), 0.84)
     return x / (1.0 + x)
 
 
 @kernel
-def viscosity_of_air(temperature):  # type: ignore[no-untyped-def]
+def viscosity_of_air(temperature: float) -> float:
     """Dynamic viscosity, Pa s (U.S. Standard Atmosphere 1976, eq. 51)."""
-    return 1.458e-6 * temperature**1.5 / (temperature + 110.4)
+    return 1.458e-6 * temperature * math.sqrt(temperature) / (temperature + 110.4)
 
 
 @kernel
-def vapour_pressure(temperature):  # type: ignore[no-untyped-def]
+def vapour_pressure(temperature: float) -> float:
     """Saturation pressure over water, Pa (Alduchov & Eskridge 1996)."""
     t = temperature - FREEZING
     return 610.94 * math.exp(17.625 * t / (t + 243.04))
 
 
 @kernel
-def heat_transfer(speed, diameter, density, temperature):  # type: ignore[no-untyped-def]
+def heat_transfer(speed: float, diameter: float, density: float, temperature: float) -> float:
     """Convective coefficient at the stagnation line, W/(m2 K): Nu = 1.10 Re^0.472 (Gelder & Lewis, NACA TN 2453).
 
     Conductivity from U.S. Standard Atmosphere 1976, eq. 53, at the film temperature.
     """
     film = 0.5 * (temperature + FREEZING)
-    conductivity = 2.64638e-3 * film**1.5 / (film + 245.4 * 10.0 ** (-12.0 / film))
+    conductivity = 2.64638e-3 * film * math.sqrt(film) / (film + 245.4 * math.pow(10.0, -12.0 / film))
     reynolds = density * speed * diameter / viscosity_of_air(film)
-    return conductivity / diameter * 1.10 * reynolds**0.472
+    return conductivity / diameter * 1.10 * math.pow(reynolds, 0.472)
 
 
 @kernel
-def evaporative_cooling(temperature, pressure):  # type: ignore[no-untyped-def]
+def evaporative_cooling(temperature: float, pressure: float) -> float:
     """Evaporation at a surface at 0 C as if it were a difference of air temperature, K (Lewis relation).
 
     Diffusivity of vapour 2.11e-5 (T/273.15)^1.94 (101325/p) m2/s (Pruppacher & Klett).
     """
     film = 0.5 * (temperature + FREEZING)
-    diffusivity = 2.11e-5 * (film / FREEZING) ** 1.94 * 101325.0 / pressure
+    diffusivity = 2.11e-5 * math.pow(film / FREEZING, 1.94) * 101325.0 / pressure
     schmidt = viscosity_of_air(film) * GAS_CONSTANT * film / (pressure * diffusivity)
     surface, air = vapour_pressure(FREEZING), vapour_pressure(temperature)
     mixing = 0.622 * (surface - air) / (pressure - surface)
-    return (PRANDTL / schmidt) ** (2.0 / 3.0) * EVAPORATION / AIR_HEAT * mixing
+    return math.pow(PRANDTL / schmidt, 2.0 / 3.0) * EVAPORATION / AIR_HEAT * mixing
 
 
 @kernel
-def freezing_fraction(lwc, speed, beta, diameter, temperature, density):  # type: ignore[no-untyped-def]
+def freezing_fraction(
+    lwc: float, speed: float, beta: float, diameter: float, temperature: float, density: float
+) -> float:
     """Share of the caught water that freezes at the stagnation line, 0..1; 0 at 0 C and above."""
     if temperature >= FREEZING:
         return 0.0

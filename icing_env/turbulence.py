@@ -21,11 +21,12 @@ describe the same variation along the aircraft. The delay is the first-order Pad
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from icing_env.jit import kernel
-from icing_env.random import STREAM_TURBULENCE, STREAM_TURBULENCE_START, normal, normal4, uniform, words4
+from icing_env.random import STREAM_TURBULENCE, STREAM_TURBULENCE_START, Word, normal, normal4, uniform, words4
 from icing_env.types import Field
 
 TURBULENCE_PARAMETERS: list[Field] = [
@@ -45,7 +46,7 @@ LOWEST_AIRSPEED = 5.0  # m/s; below it the frozen field would stand still. Assum
 
 
 @kernel
-def scales(altitude):  # type: ignore[no-untyped-def]
+def scales(altitude: float) -> tuple[float, float, float]:
     """Scale lengths and intensity ratio of MIL-F-8785C at an altitude (m) above the ground.
 
     Returns:
@@ -55,13 +56,13 @@ def scales(altitude):  # type: ignore[no-untyped-def]
     h = max(altitude / FOOT, 10.0)
     if h < 1000.0:
         base = 0.177 + 0.000823 * h
-        return FOOT * h / base**1.2, FOOT * h, base**-0.4
+        return FOOT * h / math.pow(base, 1.2), FOOT * h, math.pow(base, -0.4)
     length = FOOT * (1000.0 + 0.75 * min(h - 1000.0, 1000.0))
     return length, length, 1.0
 
 
 @kernel
-def pair_noise(tau):  # type: ignore[no-untyped-def]
+def pair_noise(tau: float) -> tuple[float, float, float, float]:
     """Decay over tau = dt/T and the lower triangular factor of the noise of the state pair (unit variance of x1).
 
     Returns:
@@ -76,13 +77,13 @@ def pair_noise(tau):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def transverse(x1, x2):  # type: ignore[no-untyped-def]
+def transverse(x1: float, x2: float) -> float:
     """Gust along y or z of its filter's two states, m/s."""
     return _SQRT_HALF * (_SQRT3 * x1 + (1.0 - _SQRT3) * x2)
 
 
 @kernel
-def lag(y, before, after, tau):  # type: ignore[no-untyped-def]
+def lag(y: float, before: float, after: float, tau: float) -> float:
     """First-order lag over tau = dt/T behind an input that goes in a straight line from `before` to `after`."""
     decay = math.exp(-tau)
     gain = (1.0 - decay) / tau
@@ -90,7 +91,7 @@ def lag(y, before, after, tau):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def stationary_lag(x1, x2, time, time_lag, sigma, n):  # type: ignore[no-untyped-def]
+def stationary_lag(x1: float, x2: float, time: float, time_lag: float, sigma: float, n: float) -> float:
     """Stationary sample of a lag (time constant `time_lag`) behind `transverse(x1, x2)`, given x1 and x2."""
     a, b = 1.0 / time, 1.0 / time_lag
     m1 = sigma * sigma * _SQRT_HALF * 0.5 * (1.0 + _SQRT3) * b / (a + b)
@@ -101,15 +102,15 @@ def stationary_lag(x1, x2, time, time_lag, sigma, n):  # type: ignore[no-untyped
 
 
 @kernel
-def roll_spectrum(sigma, length, span, airspeed):  # type: ignore[no-untyped-def]
+def roll_spectrum(sigma: float, length: float, span: float, airspeed: float) -> tuple[float, float]:
     """Standard deviation (rad/s) and time constant (s) of the rolling gust."""
     time = 4.0 * span / (math.pi * airspeed)
-    density = 0.8 * (0.25 * math.pi * length / span) ** (1.0 / 3.0) / (length * airspeed)
+    density = 0.8 * math.pow(0.25 * math.pi * length / span, 1.0 / 3.0) / (length * airspeed)
     return sigma * math.sqrt(density * 0.5 * math.pi / time), time
 
 
 @kernel
-def discrete_gust(time, airspeed, p):  # type: ignore[no-untyped-def]
+def discrete_gust(time: float, airspeed: float, p: Any) -> float:
     """Shape of the discrete gust, 0..1: (1 - cos(pi s / H)) / 2 for 0 <= s <= 2 H, 14 CFR 25.341(a)(2)."""
     length = p.gust_length
     s = airspeed * (time - p.gust_start_time)
@@ -119,7 +120,7 @@ def discrete_gust(time, airspeed, p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_discrete(s, p, airspeed, dt):  # type: ignore[no-untyped-def]
+def add_discrete(s: Any, p: Any, airspeed: float, dt: float) -> None:
     """Add the discrete gust to gust_u, gust_v, gust_w."""
     if p.gust_amplitude_u != 0.0 or p.gust_amplitude_v != 0.0 or p.gust_amplitude_w != 0.0:
         shape = discrete_gust(float(s.step) * dt, airspeed, p)
@@ -129,7 +130,7 @@ def add_discrete(s, p, airspeed, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def calm(s):  # type: ignore[no-untyped-def]
+def calm(s: Any) -> None:
     """No turbulence: states and gusts exactly zero, the tail's gust left to its delay."""
     s.dryden_u = s.dryden_v1 = s.dryden_v2 = s.dryden_w1 = s.dryden_w2 = 0.0
     s.dryden_p = s.dryden_q = s.dryden_r = 0.0
@@ -137,7 +138,7 @@ def calm(s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_translation(s):  # type: ignore[no-untyped-def]
+def put_translation(s: Any) -> None:
     """Gust velocities of the filter states."""
     s.gust_u = s.dryden_u
     s.gust_v = transverse(s.dryden_v1, s.dryden_v2)
@@ -145,7 +146,7 @@ def put_translation(s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_rotation(s, p, airspeed):  # type: ignore[no-untyped-def]
+def put_rotation(s: Any, p: Any, airspeed: float) -> None:
     """Gust rotations: the derivative of w and v along the path, by the lags whose states are dryden_q, dryden_r."""
     s.gust_p = s.dryden_p
     s.gust_q = -math.pi / (4.0 * p.span) * (transverse(s.dryden_w1, s.dryden_w2) - s.dryden_q)
@@ -153,13 +154,13 @@ def put_rotation(s, p, airspeed):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def uniform16(word):  # type: ignore[no-untyped-def]
+def uniform16(word: Word) -> float:
     """Uniform deviate in (0, 1) of a 16-bit word."""
     return (float(np.int64(word)) + 0.5) / 65536.0
 
 
 @kernel
-def advance_translation(s, sigma, airspeed, dt):  # type: ignore[no-untyped-def]
+def advance_translation(s: Any, sigma: float, airspeed: float, dt: float) -> None:
     """Advance the filters of u, v, w (one Philox block: 32 bits a noise, 16 for each pair's small second noise)."""
     length_uv, length_w, ratio = scales(s.altitude)
     a, b, c, d = words4(s.seed, STREAM_TURBULENCE, s.step, 0)
@@ -179,7 +180,7 @@ def advance_translation(s, sigma, airspeed, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def advance_rotation(s, p, airspeed, dt, v_before, w_before):  # type: ignore[no-untyped-def]
+def advance_rotation(s: Any, p: Any, airspeed: float, dt: float, v_before: float, w_before: float) -> None:
     """Advance the rolling gust and the lags behind w and v, after the translation; then gust_p, gust_q, gust_r."""
     length_w = scales(s.altitude)[1]
     sigma_p, time_p = roll_spectrum(p.turbulence_sigma_w, length_w, p.span, airspeed)
@@ -193,7 +194,7 @@ def advance_rotation(s, p, airspeed, dt, v_before, w_before):  # type: ignore[no
 
 
 @kernel
-def advance_turbulence(s, p, airspeed, dt):  # type: ignore[no-untyped-def]
+def advance_turbulence(s: Any, p: Any, airspeed: float, dt: float) -> None:
     """Draw the gusts of the step that begins now.
 
     Args:
@@ -224,7 +225,7 @@ def advance_turbulence(s, p, airspeed, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def start_turbulence(s, p, airspeed):  # type: ignore[no-untyped-def]
+def start_turbulence(s: Any, p: Any, airspeed: float) -> None:
     """Draw filter states and gusts from their stationary distribution (arguments as `advance_turbulence`)."""
     v, sigma = max(airspeed, LOWEST_AIRSPEED), p.turbulence_sigma_w
     calm(s)

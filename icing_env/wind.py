@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from icing_env.jit import kernel
 from icing_env.types import Field
 
@@ -16,7 +18,7 @@ WIND_PARAMETERS: list[Field] = [
 
 
 @kernel
-def wind(altitude, p):  # type: ignore[no-untyped-def]
+def wind(altitude: float, p: Any) -> tuple[float, float, float]:
     """Velocity of the air.
 
     Args:
