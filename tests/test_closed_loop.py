@@ -10,6 +10,10 @@ from controlled import believed
 from numpy.typing import NDArray
 
 from controllers import autopilot, envelope_protection, ice_management
+from estimators.airframe import airframe_from
+from estimators.hinf import init
+from estimators.hinf import step as observe
+from estimators.hinf_tuning import default_tuning
 from icing_env import aircraft
 from icing_env.simulate import Fleet
 from icing_env.trim import trim
@@ -22,7 +26,8 @@ LEVEL = 2200.0
 class Flight:
     """A fleet in level trim, one row per airspeed, with everything that controls it."""
 
-    def __init__(self, speeds: list[float], instruments: str = "perfect", turbulence: float = 0.0, seed: int = 5):
+    def __init__(self, speeds: list[float], instruments: str = "perfect", turbulence: float = 0.0, seed: int = 5,
+                 observed: bool = False):
         n = len(speeds)
         parameters = aircraft.changed(aircraft.load(instruments=instruments), turbulence_sigma_w=turbulence)
         self.fleet = Fleet(parameters, n, DT)
@@ -41,6 +46,8 @@ class Flight:
         self.estimate: NDArray = np.zeros(n, ESTIMATE)
         self.estimate[:] = believed(n)
         self.estimate["excitation_longitudinal"] = 0.0
+        self.airframe, self.tuning = airframe_from(parameters), default_tuning()
+        self.observer = init(self.airframe, self.tuning, n) if observed else None
         self.gains = autopilot.load_gains(), ice_management.load_tuning(), envelope_protection.load_tuning()
         self.changed = np.zeros(n, bool)
 
@@ -52,6 +59,8 @@ class Flight:
         gains, ims, protection = self.gains
         f, rows = self.fleet, []
         for _ in range(round(seconds/DT)):
+            if self.observer is not None:
+                observe(self.observer, self.estimate, f.measurement, self.airframe, self.tuning, DT)
             ice_management.step(self.advisory, self.estimate, f.measurement, f.parameters, ims, DT)
             if stick is None:
                 autopilot.step(self.autopilot, f.command, f.measurement, self.target, self.advisory, gains, DT)
@@ -162,6 +171,19 @@ def test_severe_ice_is_flown_down_not_into_the_stall(error):
     assert log[-1, 0, 0] < LEVEL - 20.0
     assert np.degrees(flight.fleet.current["alpha_stall_left"][0]) - log[:, 2].max() > 1.0
     assert log[:, 1].min() > a["airspeed_limit"] - 2.0
+
+
+def test_the_observer_in_the_loop_sees_ice_and_raises_no_alarm_in_clear_air():
+    clear = Flight([60.0, 66.0, 72.0], "nasa_2002", turbulence=1.5, observed=True)
+    clear.fly(120.0)
+    assert (clear.advisory["ice_detected"] == 0).all() and clear.advisory["severity"].max() < 0.1
+    iced = Flight([60.0, 66.0, 70.0], "nasa_2002", turbulence=1.0, observed=True)
+    for k in range(121):
+        for surface in SURFACES:
+            iced.fleet.state[f"eta_{surface}"] = 0.06*k/120
+        iced.fly(1.0)
+    assert (iced.advisory["ice_detected"] == 1).all() and (iced.advisory["boots_tail"] == 1).all()
+    assert iced.advisory["severity"] == pytest.approx(0.06/0.19, abs=0.08)
 
 
 def test_batch_flies_as_the_single_aircraft_bit_for_bit():
