@@ -60,12 +60,12 @@ def aileron_hinge_moment(dynamic_pressure: float, left: float, right: float, x, 
 
 
 @kernel
-def floated(hinge_moment: float, hold: float, stiffness: float) -> float:
+def floated(hinge_moment: float, hold: float, per_stiffness: float) -> float:
     """Angle [rad] by which a hinge moment moves its surface against the controls: zero while it can be held."""
-    return (hinge_moment - min(max(hinge_moment, -hold), hold))/stiffness
+    return (hinge_moment - min(max(hinge_moment, -hold), hold))*per_stiffness
 
 
 @kernel
-def surface_rate(position: float, target: float, low: float, high: float, lag: float, rate: float) -> float:
+def surface_rate(position: float, target: float, low: float, high: float, per_lag: float, rate: float) -> float:
     """Rate [rad/s] of a surface on its way to a target."""
-    return min(max((min(max(target, low), high) - position)/lag, -rate), rate)
+    return min(max((min(max(target, low), high) - position)*per_lag, -rate), rate)

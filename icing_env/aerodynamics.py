@@ -65,9 +65,9 @@ def smootherstep(x: float) -> float:
 
 
 @kernel
-def separation(alpha: float, onset: float, p) -> float:
+def separation(alpha: float, onset: float, c, p) -> float:
     """Separated share, 0..1, of a half wing at its local angle of attack (upright and inverted stall)."""
-    return smootherstep(max(alpha - onset, -alpha - p.alpha_stall_negative)/p.stall_width)
+    return smootherstep(max(alpha - onset, -alpha - p.alpha_stall_negative)*c.per_stall_width)
 
 
 @kernel
@@ -97,7 +97,7 @@ def longitudinal(alpha: float, sine: float, qhat: float, left: float, right: flo
     rest_x = p.CX_flap*x.flap + low*p.induced_drag*lift*lift
     rest_z = c.CZ_q*qhat + c.CZ_elevator*x.elevator + p.CZ_CT*ct + low*p.ground_lift*lift
     share = 0.5*(left + right)
-    lag = p.Cm_alphadot*p.chord/(2.0*p.tail_arm)*(alpha - x.alpha_downwash)
+    lag = 0.5*p.Cm_alphadot*p.chord*c.per_tail_arm*(alpha - x.alpha_downwash)
     cm = (c.Cm_0 + c.Cm_alpha*((1.0 - share)*alpha + share*p.Cm_alpha_separated*sine)
           + (c.Cm_q - p.Cm_alphadot)*qhat + lag + p.Cm_alpha_tail*arrival
           + c.Cm_elevator*x.elevator*(1.0 + p.Cm_elevator_CT*ct)*(1.0 - p.tail_stall_elevator_loss*tail)

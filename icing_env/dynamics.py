@@ -15,17 +15,33 @@ from icing_env.actuators import aileron_hinge_moment, elevator_hinge_moment, flo
 from icing_env.aerodynamics import CT_MAX, lateral, longitudinal, separation, smootherstep, tail_angle
 from icing_env.atmosphere import GAS_CONSTANT, gravity, static_air
 from icing_env.frames import direction_cosines, to_body, to_local
-from icing_env.jit import kernel
+from icing_env.jit import block, kernel
 from icing_env.propulsion import power_available, thrust_per_power
+from icing_env.severity import iced_aircraft
 from icing_env.wind import wind
 
-FLAP_LAG = 0.2  # s, rounds the corner where the flap arrives (assumed)
+PER_FLAP_LAG = 5.0  # 1/s, rounds the corner where the flap arrives (assumed)
 AIRSPEED_FLOOR = 0.1524  # m/s (0.5 ft/s), floor of the normalised rates (NASA/TM-2015-218675, case 3)
 
 
 @kernel
+def present_aircraft(s, p, c) -> None:
+    """The aircraft of this step: coefficients and mass with the ice it carries, and reciprocals for the equations."""
+    iced_aircraft(s, p, c)
+    c.per_mass, c.per_inertia_yy = 1.0/c.mass, 1.0/p.inertia_yy
+    determinant = 1.0/(p.inertia_xx*p.inertia_zz - p.inertia_xz*p.inertia_xz)
+    c.per_inertia_xx, c.per_inertia_zz = p.inertia_zz*determinant, p.inertia_xx*determinant
+    c.per_inertia_xz = p.inertia_xz*determinant
+    c.per_stall_width, c.per_tail_stall_width = 1.0/p.stall_width, 1.0/p.tail_stall_width
+    c.per_tail_arm, c.per_spool_time = 1.0/p.tail_arm, 1.0/p.spool_time
+    c.per_elevator_lag, c.per_aileron_lag, c.per_rudder_lag = 1.0/p.elevator_lag, 1.0/p.aileron_lag, 1.0/p.rudder_lag
+    c.per_elevator_stiffness = 1.0/p.hinge_elevator_stiffness
+    c.per_aileron_stiffness = 1.0/p.hinge_aileron_stiffness
+
+
+@kernel
 def air_data(x, attitude: tuple, s, p) -> tuple:
-    """Airspeed [m/s], alpha, beta [rad], sine of alpha and the air velocity along body x, y, z.
+    """Airspeed [m/s], alpha, beta [rad], sine of alpha, air velocity along body x, y, z, 1/airspeed.
 
     Inertial velocity less wind less gust; `attitude`: the direction cosines.
     """
@@ -34,11 +50,12 @@ def air_data(x, attitude: tuple, s, p) -> tuple:
     ua, va, wa = x.u - wx - s.gust_u, x.v - wy - s.gust_v, x.w - wz - s.gust_w
     plane = math.sqrt(ua*ua + wa*wa)
     airspeed = math.sqrt(plane*plane + va*va)
+    slowness = 1.0/max(airspeed, AIRSPEED_FLOOR)
     sine = wa/max(plane, 1e-9)
     # asin is exact to rounding below 45 deg and three times faster than atan2
     alpha = math.asin(sine) if abs(wa) < ua else math.atan2(wa, ua)
-    beta = math.asin(va/max(airspeed, 1e-9)) if airspeed > 1e-9 else 0.0
-    return airspeed, alpha, beta, sine, ua, va, wa
+    beta = math.asin(min(max(va*slowness, -1.0), 1.0))
+    return airspeed, alpha, beta, sine, ua, va, wa, slowness
 
 
 @kernel
@@ -50,10 +67,8 @@ def forces(x, attitude: tuple, s, c, p) -> tuple:
     """
     kelvin, static = static_air(x.altitude)
     density = p.density_factor*static/(GAS_CONSTANT*(kelvin + p.temperature_offset))
-    airspeed, alpha, beta, sine, ua, va, wa = air_data(x, attitude, s, p)
-    speed = max(airspeed, AIRSPEED_FLOOR)
+    airspeed, alpha, beta, sine, ua, va, wa, slowness = air_data(x, attitude, s, p)
     qbar = 0.5*density*airspeed*airspeed
-    slowness = 1.0/speed
     half = 0.5*slowness
     pa, qa, ra = x.p - s.gust_p, x.q - s.gust_q, x.r - s.gust_r
     phat, qhat, rhat = pa*p.span*half, qa*p.chord*half, ra*p.span*half
@@ -67,11 +82,11 @@ def forces(x, attitude: tuple, s, c, p) -> tuple:
 
     wingtip = phat*p.panel_arm
     flap_shift = p.alpha_stall_flap*x.flap
-    left = separation(alpha - wingtip, c.alpha_stall_left + flap_shift, p)
-    right = separation(alpha + wingtip, c.alpha_stall_right + flap_shift, p)
+    left = separation(alpha - wingtip, c.alpha_stall_left + flap_shift, c, p)
+    right = separation(alpha + wingtip, c.alpha_stall_right + flap_shift, c, p)
     arrival = (s.gust_w - s.gust_w_tail)*slowness
     alpha_tail = tail_angle(alpha, arrival, qa, slowness, x, p)
-    tail = smootherstep((-alpha_tail - c.alpha_tail_stall)/p.tail_stall_width)
+    tail = smootherstep((-alpha_tail - c.alpha_tail_stall)*c.per_tail_stall_width)
     height = 16.0*(x.altitude - p.ground_altitude)
     low = p.span*p.span/(p.span*p.span + height*height)
 
@@ -100,10 +115,9 @@ def forces(x, attitude: tuple, s, c, p) -> tuple:
 def rigid_body(x, attitude: tuple, dx, fx, fy, fz, roll, pitch, yaw, c, p) -> None:
     """Newton and Euler: rates of velocity, attitude, rotation and position from force [N] and moment [N m]."""
     g = gravity(x.altitude, p.gravity_sea_level, p.earth_radius)
-    per_mass = 1.0/c.mass
-    dx.u = x.r*x.v - x.q*x.w + attitude[2]*g + fx*per_mass
-    dx.v = x.p*x.w - x.r*x.u + attitude[5]*g + fy*per_mass
-    dx.w = x.q*x.u - x.p*x.v + attitude[8]*g + fz*per_mass
+    dx.u = x.r*x.v - x.q*x.w + attitude[2]*g + fx*c.per_mass
+    dx.v = x.p*x.w - x.r*x.u + attitude[5]*g + fy*c.per_mass
+    dx.w = x.q*x.u - x.p*x.v + attitude[8]*g + fz*c.per_mass
     dx.e0 = -0.5*(x.e1*x.p + x.e2*x.q + x.e3*x.r)
     dx.e1 = 0.5*(x.e0*x.p + x.e2*x.r - x.e3*x.q)
     dx.e2 = 0.5*(x.e0*x.q + x.e3*x.p - x.e1*x.r)
@@ -111,41 +125,40 @@ def rigid_body(x, attitude: tuple, dx, fx, fy, fz, roll, pitch, yaw, c, p) -> No
     ixx, iyy, izz, ixz = p.inertia_xx, p.inertia_yy, p.inertia_zz, p.inertia_xz
     rolling = roll + ixz*x.p*x.q + (iyy - izz)*x.q*x.r
     yawing = yaw - ixz*x.q*x.r + (ixx - iyy)*x.p*x.q
-    determinant = 1.0/(ixx*izz - ixz*ixz)
-    dx.p = (izz*rolling + ixz*yawing)*determinant
-    dx.q = (pitch + (izz - ixx)*x.p*x.r - ixz*(x.p*x.p - x.r*x.r))/iyy
-    dx.r = (ixx*yawing + ixz*rolling)*determinant
+    dx.p = c.per_inertia_xx*rolling + c.per_inertia_xz*yawing
+    dx.q = (pitch + (izz - ixx)*x.p*x.r - ixz*(x.p*x.p - x.r*x.r))*c.per_inertia_yy
+    dx.r = c.per_inertia_zz*yawing + c.per_inertia_xz*rolling
     north, east, down = to_local(attitude, x.u, x.v, x.w)
     dx.north, dx.east, dx.altitude = north, east, -down
 
 
 @kernel
-def controls_and_engines(x, dx, u, hinge_e, hinge_a, static, p) -> None:
+def controls_and_engines(x, dx, u, hinge_e, hinge_a, static, c, p) -> None:
     """Rates of the surfaces, the flap and the shaft powers."""
     dx.elevator = surface_rate(
         x.elevator,
         p.elevator_gearing*u.elevator + p.elevator_offset
-        + floated(hinge_e, p.hinge_elevator_hold, p.hinge_elevator_stiffness),
-        p.elevator_min, p.elevator_max, p.elevator_lag, p.elevator_rate)
+        + floated(hinge_e, p.hinge_elevator_hold, c.per_elevator_stiffness),
+        p.elevator_min, p.elevator_max, c.per_elevator_lag, p.elevator_rate)
     dx.aileron = surface_rate(
         x.aileron,
         p.aileron_gearing*u.aileron + p.aileron_offset
-        + floated(hinge_a, p.hinge_aileron_hold, p.hinge_aileron_stiffness),
-        p.aileron_min, p.aileron_max, p.aileron_lag, p.aileron_rate)
+        + floated(hinge_a, p.hinge_aileron_hold, c.per_aileron_stiffness),
+        p.aileron_min, p.aileron_max, c.per_aileron_lag, p.aileron_rate)
     dx.rudder = surface_rate(x.rudder, p.rudder_gearing*u.rudder + p.rudder_offset,
-                             p.rudder_min, p.rudder_max, p.rudder_lag, p.rudder_rate)
-    dx.flap = surface_rate(x.flap, u.flap, 0.0, p.flap_max, FLAP_LAG, p.flap_rate)
-    full, spool = power_available(static, p), 1.0/p.spool_time
-    dx.power_left = (full*min(max(u.throttle_left, 0.0), 1.0) - x.power_left)*spool
-    dx.power_right = (full*min(max(u.throttle_right, 0.0), 1.0) - x.power_right)*spool
+                             p.rudder_min, p.rudder_max, c.per_rudder_lag, p.rudder_rate)
+    dx.flap = surface_rate(x.flap, u.flap, 0.0, p.flap_max, PER_FLAP_LAG, p.flap_rate)
+    full = power_available(static, p)
+    dx.power_left = (full*min(max(u.throttle_left, 0.0), 1.0) - x.power_left)*c.per_spool_time
+    dx.power_right = (full*min(max(u.throttle_right, 0.0), 1.0) - x.power_right)*c.per_spool_time
 
 
-@kernel
+@block
 def derivative(x, dx, s, c, p, u) -> None:
     """Rates of the whole continuous state, written into `dx`."""
     attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
     (fx, fy, fz, roll, pitch, yaw, airspeed, alpha, _beta, _density, _left, _right,
      hinge_e, hinge_a, static) = forces(x, attitude, s, c, p)
     rigid_body(x, attitude, dx, fx, fy, fz, roll, pitch, yaw, c, p)
-    controls_and_engines(x, dx, u, hinge_e, hinge_a, static, p)
-    dx.alpha_downwash = (alpha - x.alpha_downwash)*max(airspeed, AIRSPEED_FLOOR)/p.tail_arm
+    controls_and_engines(x, dx, u, hinge_e, hinge_a, static, c, p)
+    dx.alpha_downwash = (alpha - x.alpha_downwash)*max(airspeed, AIRSPEED_FLOOR)*c.per_tail_arm

@@ -1,6 +1,7 @@
-"""How the physics is compiled: two decorators over numba's `njit`.
+"""How the physics is compiled: three decorators over numba's `njit`.
 
-`kernel` marks a scalar building block; it is compiled into whatever calls it. `entry` marks a function that
+`kernel` marks a scalar building block; it is compiled into whatever calls it (a call costs more than most of their
+arithmetic). `block` marks a large piece called from several places; it stays a function of its own. `entry` marks a function that
 Python calls: it releases the GIL and is cached on disk. Numba's own cache looks only at the file of the entry
 itself, so that a change in a file it calls would run stale code; ours lives in a folder named by a hash of every
 source file that can hold a kernel, so that a changed source can never meet an old binary.
@@ -45,8 +46,13 @@ def cache_folder() -> str:
 
 
 def kernel(function: F) -> F:
-    """Compile a scalar building block; called only from other compiled functions."""
+    """Compile a scalar building block into its callers; called only from other compiled functions."""
     return numba.njit(function, error_model="numpy", forceinline=True)  # type: ignore[no-any-return]
+
+
+def block(function: F) -> F:
+    """Compile a large piece that is called from several places: kept as one function, so that it compiles once."""
+    return numba.njit(function, error_model="numpy")  # type: ignore[no-any-return]
 
 
 def entry(function: F) -> F:

@@ -83,14 +83,14 @@ def start_instruments(x, s, c, p, dt: float) -> None:
     s.boom_position, s.boom_rate = 0.0, 0.0
     s.filtered_alpha, s.filtered_beta = alpha, beta
     s.filtered_p, s.filtered_q, s.filtered_r = x.p, x.q, x.r
-    s.filtered_ax, s.filtered_ay, s.filtered_az = fx/c.mass, fy/c.mass, fz/c.mass
+    s.filtered_ax, s.filtered_ay, s.filtered_az = fx*c.per_mass, fy*c.per_mass, fz*c.per_mass
     s.filtered_elevator, s.filtered_aileron, s.filtered_rudder = x.elevator, x.aileron, x.rudder
 
 
 @kernel
 def filter_flow_and_inertial(x, s, c, p, airspeed, alpha, beta, fx, fy, fz) -> None:
     """Lags of pitot and vanes, the boom, then the same low pass on every fast channel."""
-    cut, per_mass = s.gain_filter, 1.0/c.mass
+    cut, per_mass = s.gain_filter, c.per_mass
     offset = p.vane_position_error/max(airspeed, 1.0)
     s.vane_alpha += s.gain_vane*(alpha + offset*x.q - s.vane_alpha)
     s.vane_beta += s.gain_vane*(beta - offset*x.r - s.vane_beta)
@@ -184,5 +184,5 @@ def read_instruments(x, s, m, c, p, u, o, ten_hertz: bool, one_hertz: bool) -> N
         read_engines_and_navigation(x, attitude, s, m, p, thrust_left, thrust_right, hinge_e, hinge_a, static, spare)
     if one_hertz:
         read_slow(s, m, p)
-    o.load_factor = -fz/(c.mass*p.gravity_sea_level)
+    o.load_factor = -fz*c.per_mass/p.gravity_sea_level
     o.airspeed, o.alpha, o.beta = airspeed, alpha, beta

@@ -16,16 +16,15 @@ from numpy.typing import NDArray
 from icing_env.accretion import advance_accretion
 from icing_env.atmosphere import GAS_CONSTANT, pressure
 from icing_env.cloud import advance_cloud
-from icing_env.dynamics import air_data
+from icing_env.dynamics import air_data, present_aircraft
 from icing_env.frames import direction_cosines
 from icing_env.ice_protection import advance_protection
-from icing_env.integrate import STAGES, normalise, rk4
+from icing_env.integrate import STAGES, TOGETHER, TRIAL, copy, rk4
 from icing_env.jit import entry, kernel
 from icing_env.parameters import PARAMETERS
 from icing_env.sensors import hold_filter_constants, read_instruments, start_instruments
-from icing_env.severity import iced_aircraft
 from icing_env.turbulence import advance_turbulence, start_turbulence
-from icing_env.types import COMMAND, CONTINUOUS, CURRENT, MEASUREMENT, N_CONTINUOUS, OUTCOME, STATE
+from icing_env.types import COMMAND, CONTINUOUS, CURRENT, MEASUREMENT, OUTCOME, STATE
 
 
 
@@ -38,58 +37,59 @@ def advance_weather_and_ice(s, p, airspeed: float, dt: float) -> None:
 
 
 @kernel
-def fly(s, row, stage, rows, total, m, c, p, u, o, substeps: int, dt: float, ten_hertz: int, one_hertz: int) -> None:
-    """One environment step of one aircraft."""
-    slow = s.step % one_hertz == 0
-    airspeed = o.airspeed
-    if slow:
-        advance_weather_and_ice(s, p, airspeed, dt*one_hertz)
+def prepare(s, c, p, u, o, dt: float, one_hertz: int) -> None:
+    """What is held over the step: weather and ice (once a second), ice protection, coefficients, gusts."""
+    if s.step % one_hertz == 0:
+        advance_weather_and_ice(s, p, o.airspeed, dt*one_hertz)
         hold_filter_constants(s, p, dt)
     advance_protection(s, p, u, dt)
-    iced_aircraft(s, p, c)
-    advance_turbulence(s, p, airspeed, dt)
-    for i in range(N_CONTINUOUS):
-        rows[0, i] = row[i]
-    for _ in range(substeps):
-        rk4(stage, rows, total, s, c, p, u, dt/substeps)
-    normalise(stage[0])
-    for i in range(N_CONTINUOUS):
-        row[i] = rows[0, i]
+    present_aircraft(s, p, c)
+    advance_turbulence(s, p, o.airspeed, dt)
+
+
+@kernel
+def finish(x, s, m, c, p, u, o, dt: float, ten_hertz: int, one_hertz: int) -> None:
+    """Clock and instruments at the end of the step."""
+    one = s.step % one_hertz == 0
     s.step += 1
     m.time = s.step*dt
-    read_instruments(stage[0], s, m, c, p, u, o, s.step % ten_hertz == 0, slow)
+    read_instruments(x, s, m, c, p, u, o, s.step % ten_hertz == 0, one)
 
 
 @entry
-def advance(state, state_rows, stage, rows, total, measurement, current, parameters, command, outcome,
+def advance(state, stage, measurement, current, parameters, command, outcome,
             substeps, dt, ten_hertz, one_hertz) -> None:
     """One environment step of every row; `parameters` has a row per aircraft or one for all."""
     shared = len(parameters) == 1
-    for i in range(len(state)):
-        fly(state[i], state_rows[i], stage, rows, total, measurement[i], current[i],
-            parameters[0 if shared else i], command[i], outcome[i], substeps, dt, ten_hertz, one_hertz)
+    for first in range(0, len(state), TOGETHER):
+        count = min(TOGETHER, len(state) - first)
+        for j in range(count):
+            i = first + j
+            prepare(state[i], current[i], parameters[0 if shared else i], command[i], outcome[i], dt, one_hertz)
+            copy(stage[j, TRIAL], state[i])
+        for _ in range(substeps):
+            rk4(stage, first, count, state, current, parameters, shared, command, dt/substeps)
+        for j in range(count):
+            i = first + j
+            copy(state[i], stage[j, TRIAL])
+            finish(stage[j, TRIAL], state[i], measurement[i], current[i], parameters[0 if shared else i], command[i],
+                   outcome[i], dt, ten_hertz, one_hertz)
 
 
 @entry
-def start(state, state_rows, stage, rows, measurement, current, parameters, command, outcome, dt) -> None:
+def start(state, stage, measurement, current, parameters, command, outcome, dt) -> None:
     """After the continuous state was set: settle gusts and instruments and take a first sample."""
     shared = len(parameters) == 1
     for i in range(len(state)):
         s, c, p = state[i], current[i], parameters[0 if shared else i]
-        for j in range(N_CONTINUOUS):
-            rows[0, j] = state_rows[i, j]
-        iced_aircraft(s, p, c)
-        start_turbulence(s, p, air_data(stage[0], direction_cosines(s.e0, s.e1, s.e2, s.e3), s, p)[0])
-        start_instruments(stage[0], s, c, p, dt)
+        x = stage[0, TRIAL]
+        copy(x, s)
+        present_aircraft(s, p, c)
+        start_turbulence(s, p, air_data(x, direction_cosines(x.e0, x.e1, x.e2, x.e3), s, p)[0])
+        start_instruments(x, s, c, p, dt)
         measurement[i].time = 0.0
         measurement[i].psi = 0.0
-        read_instruments(stage[0], s, measurement[i], c, p, command[i], outcome[i], True, True)
-
-
-def scratch() -> tuple[NDArray, NDArray, NDArray]:
-    """Work space of one thread: Runge-Kutta stages as records, the same memory as rows, and a sum."""
-    stage = np.zeros(STAGES, CONTINUOUS)
-    return stage, stage.view(np.float64).reshape(STAGES, N_CONTINUOUS), np.zeros(N_CONTINUOUS)
+        read_instruments(x, s, measurement[i], c, p, command[i], outcome[i], True, True)
 
 
 class Fleet:
@@ -112,14 +112,13 @@ class Fleet:
         self.parameters, self.n, self.dt, self.substeps = parameters, n, dt, substeps
         self.clocks = max(1, round(0.1/dt)), max(1, round(1.0/dt))  # steps per sample at 10 Hz and 1 Hz
         self.state = np.zeros(n, STATE)
-        self.state_rows = self.state.view(np.float64).reshape(n, -1)
         self.measurement = np.zeros(n, MEASUREMENT)
         self.current = np.zeros(n, CURRENT)
         self.command = np.zeros(n, COMMAND)
         self.outcome = np.zeros(n, OUTCOME)
         bounds = np.linspace(0, n, min(threads, n) + 1).astype(int)
         self._slices = [slice(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
-        self._scratch = [scratch() for _ in self._slices]
+        self._stages = [np.zeros((TOGETHER, STAGES), CONTINUOUS) for _ in self._slices]
         self._pool = ThreadPoolExecutor(len(self._slices)) if len(self._slices) > 1 else None
         self._bind()
 
@@ -127,18 +126,17 @@ class Fleet:
         """Arguments of each slice, made once: building views costs more than the flight."""
         shared = len(self.parameters) == 1
         self._arguments = [
-            (self.state[k], self.state_rows[k], *work, self.measurement[k], self.current[k],
+            (self.state[k], stage, self.measurement[k], self.current[k],
              self.parameters if shared else self.parameters[k], self.command[k], self.outcome[k],
              self.substeps, self.dt, *self.clocks)
-            for k, work in zip(self._slices, self._scratch, strict=True)
+            for k, stage in zip(self._slices, self._stages, strict=True)
         ]
 
     def start(self, rows: slice | NDArray = slice(None)) -> None:
         """Settle gusts, coefficients and instruments of the given rows on their continuous state."""
         state, measurement, current, outcome = (
             self.state[rows], self.measurement[rows], self.current[rows], self.outcome[rows])
-        stage, stage_rows, _ = self._scratch[0]
-        start(state, state.view(np.float64).reshape(len(state), -1), stage, stage_rows, measurement, current,
+        start(state, self._stages[0], measurement, current,
               self.parameters if len(self.parameters) == 1 else self.parameters[rows],
               self.command[rows], outcome, self.dt)
         if not isinstance(rows, slice):  # fancy indexing made copies

@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icing_env.atmosphere import pressure
-from icing_env.dynamics import derivative, forces
+from icing_env.dynamics import derivative, forces, present_aircraft
 from icing_env.actuators import floated
 from icing_env.errors import InputError
 from icing_env.frames import direction_cosines, euler_angles, quaternion, to_body, to_local
 from icing_env.jit import entry, kernel
 from icing_env.propulsion import power_available
-from icing_env.severity import iced_aircraft
 from icing_env.types import COMMAND, CONTINUOUS, CURRENT, STATE, Field, structured
 from icing_env.wind import wind
 
@@ -79,9 +78,9 @@ def command_of(x, s, c, u, p) -> None:
     """Surface commands that hold the present positions, gearing, rigging and hinge moments taken out."""
     values = forces(x, direction_cosines(x.e0, x.e1, x.e2, x.e3), s, c, p)
     u.elevator = (x.elevator - p.elevator_offset
-                  - floated(values[12], p.hinge_elevator_hold, p.hinge_elevator_stiffness))/p.elevator_gearing
+                  - floated(values[12], p.hinge_elevator_hold, c.per_elevator_stiffness))/p.elevator_gearing
     u.aileron = (x.aileron - p.aileron_offset
-                 - floated(values[13], p.hinge_aileron_hold, p.hinge_aileron_stiffness))/p.aileron_gearing
+                 - floated(values[13], p.hinge_aileron_hold, c.per_aileron_stiffness))/p.aileron_gearing
     u.rudder = (x.rudder - p.rudder_offset)/p.rudder_gearing
     u.flap = x.flap
 
@@ -96,7 +95,7 @@ def solve_rows(state, state_rows, current, command, condition, parameters, stage
         s, c, u, k = state[i], current[i], command[i], condition[i]
         p = parameters[0 if shared else i]
         s.gust_u, s.gust_v, s.gust_w, s.gust_p, s.gust_q, s.gust_r, s.gust_w_tail = 0., 0., 0., 0., 0., 0., 0.
-        iced_aircraft(s, p, c)
+        present_aircraft(s, p, c)
         z[:] = 0.0
         z[0] = z[3] = 0.03
         z[2] = math.atan(k.airspeed*k.turn_rate/p.gravity_sea_level)

@@ -182,6 +182,21 @@ CURRENT_FIELDS: list[Field] = [
     ("alpha_tail_stall", "rad", "tail angle (negative lift) at which the tailplane separates"),
     ("mass", "kg", "mass, ice included"),
     ("efficiency", "1", "propeller efficiency factor, ice included"),
+    # Reciprocals that every stage of the integration needs; a division costs ten multiplications.
+    ("per_mass", "1/kg", "1/mass"),
+    ("per_inertia_xx", "1/(kg m2)", "element of the inverse inertia tensor"),
+    ("per_inertia_yy", "1/(kg m2)", "element of the inverse inertia tensor"),
+    ("per_inertia_zz", "1/(kg m2)", "element of the inverse inertia tensor"),
+    ("per_inertia_xz", "1/(kg m2)", "element of the inverse inertia tensor"),
+    ("per_stall_width", "1/rad", "1/stall_width"),
+    ("per_tail_stall_width", "1/rad", "1/tail_stall_width"),
+    ("per_tail_arm", "1/m", "1/tail_arm"),
+    ("per_elevator_lag", "1/s", "1/elevator_lag"),
+    ("per_aileron_lag", "1/s", "1/aileron_lag"),
+    ("per_rudder_lag", "1/s", "1/rudder_lag"),
+    ("per_spool_time", "1/s", "1/spool_time"),
+    ("per_elevator_stiffness", "rad/(N m)", "1/hinge_elevator_stiffness"),
+    ("per_aileron_stiffness", "rad/(N m)", "1/hinge_aileron_stiffness"),
 ]
 
 # The truth that tasks and scores look at, never estimators or controllers.
