@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,18 +103,18 @@ AUTOPILOT = structured(AUTOPILOT_FIELDS)
 GAINS = structured(GAINS_FIELDS)
 
 
-def load_gains(name: str | Path = "autopilot") -> NDArray:
+def load_gains(name: str | Path = "autopilot") -> NDArray[Any]:
     """Gains of the autopilot, one row of GAINS. Raises InputError for a file that does not fit."""
     return read_parameters(name, GAINS_FIELDS)
 
 
-def init(n: int) -> NDArray:
+def init(n: int) -> NDArray[Any]:
     """Autopilots of `n` aircraft, not yet engaged (AUTOPILOT rows)."""
     return np.zeros(n, AUTOPILOT)
 
 
 @kernel
-def engage(a, m, t, g) -> None:
+def engage(a: Any, m: Any, t: Any, g: Any) -> None:
     """Start every integrator where the controls are, so that engaging moves nothing."""
     a.engaged = 1.0
     a.altitude = m.altitude
@@ -130,7 +131,7 @@ def engage(a, m, t, g) -> None:
 
 
 @kernel
-def navigate(a, m, g, dt: float) -> None:
+def navigate(a: Any, m: Any, g: Any, dt: float) -> None:
     """Complementary filters: acceleration integrated, corrected by pressure altitude and by pitot."""
     w = g.vertical_bandwidth
     cos_theta = math.cos(m.theta)
@@ -142,7 +143,7 @@ def navigate(a, m, g, dt: float) -> None:
 
 
 @kernel
-def climb_command(a, t, adv, g, dt: float) -> float:
+def climb_command(a: Any, t: Any, adv: Any, g: Any, dt: float) -> float:
     """Climb rate asked for [m/s], slewed; it yields where the airspeed nears its limit."""
     wanted = t.climb_rate
     if t.pitch_mode == 1.0:
@@ -154,7 +155,7 @@ def climb_command(a, t, adv, g, dt: float) -> float:
 
 
 @kernel
-def pitch_command(a, m, t, adv, g, climb: float, scale: float, dt: float) -> float:
+def pitch_command(a: Any, m: Any, t: Any, adv: Any, g: Any, climb: float, scale: float, dt: float) -> float:
     """Pitch angle asked for [rad], limited by the advised angle of attack."""
     low, high = g.theta_min, g.theta_max
     ceiling = clip(m.theta + adv.alpha_limit - g.alpha_margin - m.alpha, low, high)
@@ -169,7 +170,7 @@ def pitch_command(a, m, t, adv, g, climb: float, scale: float, dt: float) -> flo
 
 
 @kernel
-def hold_pitch(a, c, m, adv, g, theta: float, scale: float, dt: float) -> None:
+def hold_pitch(a: Any, c: Any, m: Any, adv: Any, g: Any, theta: float, scale: float, dt: float) -> None:
     """Elevator that holds a pitch angle; its integrator does not pull against the protection."""
     q_turn = G0/airspeed_of(m)*math.sin(m.phi)*math.tan(clip(m.phi, -1.3, 1.3))
     error = m.theta - theta
@@ -182,7 +183,7 @@ def hold_pitch(a, c, m, adv, g, theta: float, scale: float, dt: float) -> None:
 
 
 @kernel
-def hold_airspeed(a, c, m, t, adv, g, climb: float, dt: float) -> None:
+def hold_airspeed(a: Any, c: Any, m: Any, t: Any, adv: Any, g: Any, climb: float, dt: float) -> None:
     """Both power levers."""
     wanted = t.throttle
     if t.speed_mode == 1.0:
@@ -196,7 +197,7 @@ def hold_airspeed(a, c, m, t, adv, g, climb: float, dt: float) -> None:
 
 
 @kernel
-def hold_bank(a, c, m, t, adv, g, scale: float, dt: float) -> None:
+def hold_bank(a: Any, c: Any, m: Any, t: Any, adv: Any, g: Any, scale: float, dt: float) -> None:
     """Aileron that holds a bank angle or, through it, a heading."""
     wanted = t.phi
     if t.roll_mode == 1.0:
@@ -213,7 +214,7 @@ def hold_bank(a, c, m, t, adv, g, scale: float, dt: float) -> None:
 
 
 @kernel
-def damp_yaw(a, c, m, g, scale: float, dt: float) -> None:
+def damp_yaw(a: Any, c: Any, m: Any, g: Any, scale: float, dt: float) -> None:
     """Rudder: damps the yaw rate beyond that of a coordinated turn and slowly centres the ball."""
     r_turn = G0/airspeed_of(m)*math.sin(m.phi)*math.cos(m.theta)
     wanted = a.rudder_trim + scale*g.K_r*(m.r - r_turn)
@@ -223,7 +224,15 @@ def damp_yaw(a, c, m, g, scale: float, dt: float) -> None:
 
 
 @entry
-def step(autopilot, command, measurement, target, advisory, gains, dt):  # type: ignore[no-untyped-def]
+def step(
+    autopilot: NDArray[Any],
+    command: NDArray[Any],
+    measurement: NDArray[Any],
+    target: NDArray[Any],
+    advisory: NDArray[Any],
+    gains: NDArray[Any],
+    dt: float,
+) -> None:
     """One step of every autopilot, in place.
 
     Args:

@@ -17,6 +17,7 @@ Merret, Hossain & Bragg (AIAA 2002-0814) protect the same variables; the closed-
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from numpy.typing import NDArray
 
@@ -47,13 +48,13 @@ PROTECTION_FIELDS: list[Field] = [
 PROTECTION = structured(PROTECTION_FIELDS)
 
 
-def load_tuning(name: str | Path = "envelope_protection") -> NDArray:
+def load_tuning(name: str | Path = "envelope_protection") -> NDArray[Any]:
     """Gains of the protection, one row of PROTECTION. Raises InputError for a file that does not fit."""
     return read_parameters(name, PROTECTION_FIELDS)
 
 
 @kernel
-def elevator_at_limit(a, m, e, frame, g) -> float:
+def elevator_at_limit(a: Any, m: Any, e: Any, frame: Any, g: Any) -> float:
     """Elevator [rad] that balances the pitching moment at the advised angle of attack."""
     share = 0.0
     if e.health == 1.0:
@@ -68,14 +69,14 @@ def elevator_at_limit(a, m, e, frame, g) -> float:
 
 
 @kernel
-def airspeed_lack(a, m, g) -> float:
+def airspeed_lack(a: Any, m: Any, g: Any) -> float:
     """How far the predicted airspeed is below its limit [m/s], 0 above it."""
     predicted = m.airspeed + g.lead_airspeed*airspeed_rate(m, G0)
     return positive_part(a.airspeed_limit - predicted, g.airspeed_round)
 
 
 @kernel
-def protect_pitch(c, a, m, e, frame, g) -> None:
+def protect_pitch(c: Any, a: Any, m: Any, e: Any, frame: Any, g: Any) -> None:
     """Angle of attack and airspeed, through elevator and power."""
     predicted = m.alpha + g.lead_alpha*alpha_rate(m, G0)
     least = elevator_at_limit(a, m, e, frame, g) + g.K_alpha*(predicted - a.alpha_limit)
@@ -93,7 +94,7 @@ def protect_pitch(c, a, m, e, frame, g) -> None:
 
 
 @kernel
-def protect_bank(c, a, m, g) -> None:
+def protect_bank(c: Any, a: Any, m: Any, g: Any) -> None:
     """Bank, through the aileron (positive rolls left)."""
     predicted = m.phi + g.lead_bank*m.p
     least = min(g.K_bank*(predicted - a.bank_limit), g.aileron_max)
@@ -105,7 +106,15 @@ def protect_bank(c, a, m, g) -> None:
 
 
 @entry
-def protect(command, advisory, measurement, estimate, airframe, tuning, dt):  # type: ignore[no-untyped-def]
+def protect(
+    command: NDArray[Any],
+    advisory: NDArray[Any],
+    measurement: NDArray[Any],
+    estimate: NDArray[Any],
+    airframe: NDArray[Any],
+    tuning: NDArray[Any],
+    dt: float,
+) -> None:
     """Keep every aircraft inside its advised envelope: changes `command` and the advisory's `intervention` in place.
 
     Args:

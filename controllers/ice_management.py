@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,12 +65,12 @@ IMS_TUNING_FIELDS: list[Field] = [
 IMS_TUNING = structured(IMS_TUNING_FIELDS)
 
 
-def load_tuning(name: str | Path = "ice_management") -> NDArray:
+def load_tuning(name: str | Path = "ice_management") -> NDArray[Any]:
     """Thresholds of the ice management, one row of IMS_TUNING. Raises InputError for a file that does not fit."""
     return read_parameters(name, IMS_TUNING_FIELDS)
 
 
-def init(n: int) -> NDArray:
+def init(n: int) -> NDArray[Any]:
     """Advisories for `n` aircraft before the first step: no ice, nothing limited (ADVISORY rows)."""
     advisory = np.zeros(n, ADVISORY)
     for name in ("alpha_limit", "bank_limit", "flap_limit"):
@@ -78,7 +79,7 @@ def init(n: int) -> NDArray:
 
 
 @kernel
-def loss(estimate: float, std: float, clean: float, g) -> tuple:
+def loss(estimate: float, std: float, clean: float, g: Any) -> tuple[float, float]:
     """Severity that one derivative speaks for, and its weight (one over the variance)."""
     severity = (1.0 - estimate/clean)/g.derivative_loss_severe
     variance = (std/clean)*(std/clean) + g.derivative_scatter*g.derivative_scatter
@@ -86,7 +87,7 @@ def loss(estimate: float, std: float, clean: float, g) -> tuple:
 
 
 @kernel
-def assess(e, frame, g) -> tuple:
+def assess(e: Any, frame: Any, g: Any) -> tuple[float, float]:
     """Severity (0..1) and its confidence (0..1) from the estimate of now."""
     weight = g.drag_severe*g.drag_severe/(e.CD_0_std*e.CD_0_std + g.drag_scatter*g.drag_scatter)
     total = weight*e.excess_drag/g.drag_severe
@@ -106,7 +107,7 @@ def assess(e, frame, g) -> tuple:
 
 
 @kernel
-def characterise(a, e, frame, g, dt: float) -> None:
+def characterise(a: Any, e: Any, frame: Any, g: Any, dt: float) -> None:
     """Severity, confidence and detection. An unhealthy or undefined estimate changes the confidence only."""
     severity, confidence = assess(e, frame, g)
     if e.health != 1.0 or not (math.isfinite(severity) and math.isfinite(confidence)):
@@ -127,7 +128,7 @@ def characterise(a, e, frame, g, dt: float) -> None:
 
 
 @kernel
-def operate_protection(a, m, g) -> None:
+def operate_protection(a: Any, m: Any, g: Any) -> None:
     """Boots and propeller heat: on while ice is detected and it is cold enough to freeze."""
     boots = a.ice_detected if m.temperature < g.boots_temperature else 0.0
     a.boots_wing = a.boots_tail = a.boots_vtail_struts = boots
@@ -135,7 +136,7 @@ def operate_protection(a, m, g) -> None:
 
 
 @kernel
-def limit_envelope(a, m, frame, g) -> None:
+def limit_envelope(a: Any, m: Any, frame: Any, g: Any) -> None:
     """Limits of angle of attack, airspeed and bank for the present severity, mass, density and flap."""
     flap = clip(m.flap, 0.0, g.flap_full)
     a.alpha_limit = frame.alpha_stall + g.alpha_flap*flap - g.alpha_shift*a.severity - g.alpha_margin
@@ -150,7 +151,7 @@ def limit_envelope(a, m, frame, g) -> None:
 
 
 @kernel
-def limit_flap(a, e, frame, g) -> None:
+def limit_flap(a: Any, e: Any, frame: Any, g: Any) -> None:
     """Flap limit: full flap loads an iced tailplane into its stall, so it waits until the ice is gone."""
     suspected = a.severity > g.tail_severity
     if e.health == 1.0 and e.excitation_longitudinal >= g.excitation_high:
@@ -162,7 +163,14 @@ def limit_flap(a, e, frame, g) -> None:
 
 
 @entry
-def step(advisory, estimate, measurement, airframe, tuning, dt):  # type: ignore[no-untyped-def]
+def step(
+    advisory: NDArray[Any],
+    estimate: NDArray[Any],
+    measurement: NDArray[Any],
+    airframe: NDArray[Any],
+    tuning: NDArray[Any],
+    dt: float,
+) -> None:
     """One step of every ice management, in place.
 
     Args:
@@ -185,7 +193,7 @@ def step(advisory, estimate, measurement, airframe, tuning, dt):  # type: ignore
 
 
 @entry
-def operate(command, advisory):  # type: ignore[no-untyped-def]
+def operate(command: NDArray[Any], advisory: NDArray[Any]) -> None:
     """Switch on in COMMAND rows the ice protection that the ADVISORY rows ask for; nothing is switched off."""
     for i in range(len(command)):
         c, a = command[i], advisory[i]

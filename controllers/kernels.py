@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from icing_env.atmosphere import GAS_CONSTANT
 from icing_env.jit import kernel
@@ -42,19 +43,19 @@ def integrated(integral: float, rate: float, output: float, low: float, high: fl
 
 
 @kernel
-def air_density(m) -> float:
+def air_density(m: Any) -> float:
     """Density [kg/m3] of the ideal gas at the measured static pressure and temperature."""
     return max(m.pressure, 1000.0)/(GAS_CONSTANT*max(m.temperature, 150.0))
 
 
 @kernel
-def airspeed_of(m) -> float:
+def airspeed_of(m: Any) -> float:
     """Measured true airspeed [m/s], at least 15: a failed or frozen pitot must not divide by zero."""
     return max(m.airspeed, 15.0)
 
 
 @kernel
-def airspeed_rate(m, gravity: float) -> float:
+def airspeed_rate(m: Any, gravity: float) -> float:
     """Rate of the airspeed [m/s2] in still air: specific force along the air stream, and gravity."""
     sine, cosine = math.sin(m.alpha), math.cos(m.alpha)
     return m.ax*cosine + m.az*sine + gravity*(
@@ -62,7 +63,7 @@ def airspeed_rate(m, gravity: float) -> float:
 
 
 @kernel
-def alpha_rate(m, gravity: float) -> float:
+def alpha_rate(m: Any, gravity: float) -> float:
     """Rate of the angle of attack [rad/s] from rates, specific force and attitude.
 
     Stevens, Lewis & Johnson, Aircraft Control and Simulation, 3rd ed., section 2.3: the w equation divided by V, with

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from icing_env.errors import InputError, nearest
 from icing_env.types import Field, structured
 
 
-def read_parameters(name: str | Path, fields: list[Field]) -> NDArray:
+def read_parameters(name: str | Path, fields: list[Field]) -> NDArray[Any]:
     """Read one set of controller parameters.
 
     Args:
