@@ -21,8 +21,11 @@ AIRFRAME_FIELDS: list[Field] = [
     ("inertia_zz", "kg m2", "about body z"),
     ("inertia_xz", "kg m2", "+ integral of x z dm"),
     *((name, "1" if name.endswith("_0") else "1/rad", "clean aircraft") for name in DERIVATIVE_NAMES),
+    ("vane_lag", "s", "known time constant of the flow vanes, for which they are corrected; 0 where it is not stated"),
+    ("boom_gain", "rad s2/m", "known bending of the boom: error of alpha per normal acceleration; as above"),
 ]
 AIRFRAME = structured(AIRFRAME_FIELDS)
+CORRECTIONS = ("vane_lag", "boom_gain")  # of the instruments: none where they are not stated, as in flight records
 
 def published_airframe(aircraft: str | Path = "twin_otter") -> np.ndarray:
     """The clean airframe as `configs/aircraft` states it, with the sources there (`AIRFRAME` array of one row)."""
@@ -40,10 +43,11 @@ def airframe_from(parameters: np.ndarray | Mapping[str, float]) -> np.ndarray:
         rows, present = parameters.size, parameters.dtype.names or ()
     else:
         rows, present = 1, tuple(parameters)
-    missing = [name for name in names if name not in present]
+    missing = [name for name in names if name not in (*present, *CORRECTIONS)]
     if missing:
         raise InputError(f"airframe: field '{missing[0]}' is missing; needed: {', '.join(names)}")
     airframe = np.zeros(rows, AIRFRAME)
     for name in names:
-        airframe[name] = parameters[name]
+        if name in present:
+            airframe[name] = parameters[name]
     return airframe

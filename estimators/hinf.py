@@ -143,7 +143,7 @@ def observe(ob: Any, est: Any, m: Any, af: Any, tn: Any, dt: float) -> None:
     if not readable(m):
         ob["seated"] = 0.0
         return
-    moment_rows(ob, m, af, force_rows(ob, m, af))
+    moment_rows(ob, m, af, force_rows(ob, m, af, dt))
     excite(ob, m, af, tn["window"], dt)
     longitudinal, lateral, lively = shares(ob, tn, af)
     if ob["seated"] > 0.0:

@@ -36,7 +36,28 @@ def clean_zero_lift_drag(af: Any) -> float:
 
 
 @kernel
-def force_rows(ob: Any, m: Any, af: Any) -> float:
+def incidence(m: Any, lag: float, bending: float, dt: float) -> tuple[float, float]:
+    """Angles of attack and sideslip, corrected for the boom's bending (steady part) and the vanes' lag.
+
+    alpha - bending (a_z + g) + delay alphadot, and beta + delay betadot. A first-order lag that takes in the newest
+    value once a sample delays by dt/(exp(dt/lag) - 1). The rates are kinematic, from gyros, accelerometers and
+    attitude; a gust's own rate stays lagged.
+    """
+    alpha, beta, v = m["alpha"] - bending * (m["az"] + GRAVITY), m["beta"], m["airspeed"]
+    if lag <= 0.0:
+        return alpha, beta
+    delay = dt / math.expm1(dt / lag)
+    ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
+    st, ct = math.sin(m["theta"]), math.cos(m["theta"])
+    fx, fy = m["ax"] - GRAVITY * st, m["ay"] + GRAVITY * ct * math.sin(m["phi"])
+    fz = m["az"] + GRAVITY * ct * math.cos(m["phi"])
+    alpha_dot = m["q"] - sb / cb * (m["p"] * ca + m["r"] * sa) + (fz * ca - fx * sa) / (v * cb)
+    beta_dot = m["p"] * sa - m["r"] * ca + (fy * cb - sb * (fx * ca + fz * sa)) / v
+    return alpha + delay * alpha_dot, beta + delay * beta_dot
+
+
+@kernel
+def force_rows(ob: Any, m: Any, af: Any, dt: float) -> float:
     """Drag, lift and side force: states airspeed, alpha, beta; accelerometers x, z, y.
 
     Drag:  a_x = k (CX_clean(alpha) - (CD_0 - CD_0,clean) cos alpha) + T/m, k = qbar S/m. Lift-dependent drag keeps the
@@ -46,7 +67,8 @@ def force_rows(ob: Any, m: Any, af: Any) -> float:
     Side:  a_y = k (CY_0 + CY_beta beta + CY_p p^ + CY_r r^ + CY_rudder rudder).
     """
     row, rest = ob["row"], ob["rest"]
-    v, alpha, beta, p, q, r = m["airspeed"], m["alpha"], m["beta"], m["p"], m["q"], m["r"]
+    v, p, q, r = m["airspeed"], m["p"], m["q"], m["r"]
+    alpha, beta = incidence(m, af["vane_lag"], af["boom_gain"], dt)
     ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
     st, ct, sp, cp = math.sin(m["theta"]), math.cos(m["theta"]), math.sin(m["phi"]), math.cos(m["phi"])
     qbar = 0.5 * m["pressure"] / (GAS_CONSTANT * m["temperature"]) * v * v
@@ -79,20 +101,22 @@ def force_rows(ob: Any, m: Any, af: Any) -> float:
 
 @kernel
 def moment_rows(ob: Any, m: Any, af: Any, qbar: float) -> None:
-    """Pitch, roll and yaw. The states p - (Ixz/Ixx) r and r - (Ixz/Izz) p leave one moment in each equation.
+    """Pitch, roll and yaw, after `force_rows`.
 
+    The states p - (Ixz/Ixx) r and r - (Ixz/Izz) p leave one moment in each equation:
     Iyy qdot = qbar S c Cm + (Izz - Ixx) p r + Ixz (r^2 - p^2);
     Ixx pdot - Ixz rdot = qbar S b Cl + Ixz p q - (Izz - Iyy) q r;
     Izz rdot - Ixz pdot = qbar S b Cn - Ixz q r - (Iyy - Ixx) p q.
     A moment of thrust about the c.g. is not known to the observer and counts as Cm_0 or Cn_0.
     """
     row, rest = ob["row"], ob["rest"]
-    v, beta, p, q, r = m["airspeed"], m["beta"], m["p"], m["q"], m["r"]
+    v, p, q, r = m["airspeed"], m["p"], m["q"], m["r"]
+    alpha, beta = ob["y"][1], ob["y"][3]
     xx, yy, zz, xz = af["inertia_xx"], af["inertia_yy"], af["inertia_zz"], af["inertia_xz"]
     half_span, force = 0.5 * af["span"] / v, qbar * af["wing_area"]
 
     pitch = force * af["chord"] / yy
-    row[5], row[6] = pitch, pitch * m["alpha"]
+    row[5], row[6] = pitch, pitch * alpha
     row[7], row[8] = pitch * 0.5 * af["chord"] / v * q, pitch * m["elevator"]
     rest[2] = ((zz - xx) * p * r + xz * (r * r - p * p)) / yy
     for channel, inertia in ((14, xx), (20, zz)):
