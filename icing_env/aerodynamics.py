@@ -34,8 +34,8 @@ AERODYNAMIC_PARAMETERS: list[Field] = [
     ("damping_separated", "1", "share of roll damping and aileron power lost on a separated wing"),
     ("panel_arm", "1", "spanwise station of the outer panels over half span"),
     ("lift_arm", "1", "spanwise centre of pressure of a half wing over span"),
-    ("CZ_flap", "1/rad", "lift of flap"),
-    ("CX_flap", "1/rad", "drag of flap"),
+    ("CL_flap", "1/rad", "lift of flap"),
+    ("CD_flap", "1/rad", "parasite drag of flap"),
     ("Cm_flap", "1/rad", "moment of flap"),
     ("Cm_alphadot", "1", "part of Cm_q that is downwash lag"),
     ("Cm_alpha_tail", "1/rad", "moment of the tailplane alone per angle of attack at the tail"),
@@ -78,24 +78,25 @@ def tail_angle(alpha: float, arrival: float, q: float, slowness: float, x, p) ->
 
 
 @kernel
-def longitudinal(alpha: float, sine: float, qhat: float, left: float, right: float, tail: float, ct: float, low: float,
+def longitudinal(alpha: float, sine: float, cosine: float, qhat: float, left: float, right: float, tail: float, ct: float, low: float,
                  arrival: float, x, c, p) -> tuple:
     """CX, CZ of the left and right half wing (each referred to the whole area), the rest of CX and CZ, and Cm.
 
-    `sine`: of alpha; `left`, `right`, `tail`: separated shares; `ct`: thrust coefficient less its reference; `low`: 0 in
+    `sine`, `cosine`: of alpha; `left`, `right`, `tail`: separated shares; `ct`: thrust coefficient less its reference; `low`: 0 in
     free air, 1 at the ground (McCormick, Aerodynamics, Aeronautics and Flight Mechanics, 2nd ed., section 7: induced
     drag times (16 h/b)^2/(1 + (16 h/b)^2)); `arrival`: gust angle at the tail less that at the wing [rad].
     """
     plate = -sine/(0.283 + 0.222*abs(sine))
     suction = alpha*(c.CX_alpha + c.CX_alpha2*alpha)
-    flap = p.CZ_flap*x.flap
-    lift_left = (1.0 - left)*(c.CZ_0 + c.CZ_alpha_left*alpha + flap) + left*plate
-    lift_right = (1.0 - right)*(c.CZ_0 + c.CZ_alpha_right*alpha + flap) + right*plate
+    lift_left = (1.0 - left)*(c.CZ_0 + c.CZ_alpha_left*alpha) + left*plate
+    lift_right = (1.0 - right)*(c.CZ_0 + c.CZ_alpha_right*alpha) + right*plate
     axial_left = c.CX_0_left + (1.0 - left)*suction
     axial_right = c.CX_0_right + (1.0 - right)*suction
     lift = 0.5*(lift_left + lift_right)
-    rest_x = p.CX_flap*x.flap + low*p.induced_drag*lift*lift
-    rest_z = c.CZ_q*qhat + c.CZ_elevator*x.elevator + p.CZ_CT*ct + low*p.ground_lift*lift
+    flap_lift = (1.0 - 0.5*(left + right))*p.CL_flap*x.flap
+    flap_drag = p.CD_flap*x.flap + p.induced_drag*flap_lift*(flap_lift - 2.0*lift)
+    rest_x = flap_lift*sine - flap_drag*cosine + low*p.induced_drag*lift*lift
+    rest_z = -flap_lift*cosine - flap_drag*sine + c.CZ_q*qhat + c.CZ_elevator*x.elevator + p.CZ_CT*ct + low*p.ground_lift*lift
     share = 0.5*(left + right)
     lag = 0.5*p.Cm_alphadot*p.chord*c.per_tail_arm*(alpha - x.alpha_downwash)
     cm = (c.Cm_0 + c.Cm_alpha*((1.0 - share)*alpha + share*p.Cm_alpha_separated*sine)

@@ -41,7 +41,7 @@ def present_aircraft(s, p, c) -> None:
 
 @kernel
 def air_data(x, attitude: tuple, s, p) -> tuple:
-    """Airspeed [m/s], alpha, beta [rad], sine of alpha, air velocity along body x, y, z, 1/airspeed.
+    """Airspeed [m/s], alpha, beta [rad], sine and cosine of alpha, air velocity along body x, y, z, 1/airspeed.
 
     Inertial velocity less wind less gust; `attitude`: the direction cosines.
     """
@@ -51,11 +51,12 @@ def air_data(x, attitude: tuple, s, p) -> tuple:
     plane = math.sqrt(ua*ua + wa*wa)
     airspeed = math.sqrt(plane*plane + va*va)
     slowness = 1.0/max(airspeed, AIRSPEED_FLOOR)
-    sine = wa/max(plane, 1e-9)
+    per_plane = 1.0/max(plane, 1e-9)
+    sine, cosine = wa*per_plane, ua*per_plane
     # asin is exact to rounding below 45 deg and three times faster than atan2
     alpha = math.asin(sine) if abs(wa) < ua else math.atan2(wa, ua)
     beta = math.asin(min(max(va*slowness, -1.0), 1.0))
-    return airspeed, alpha, beta, sine, ua, va, wa, slowness
+    return airspeed, alpha, beta, sine, cosine, ua, va, wa, slowness
 
 
 @kernel
@@ -67,7 +68,7 @@ def forces(x, attitude: tuple, s, c, p) -> tuple:
     """
     kelvin, static = static_air(x.altitude)
     density = p.density_factor*static/(GAS_CONSTANT*(kelvin + p.temperature_offset))
-    airspeed, alpha, beta, sine, ua, va, wa, slowness = air_data(x, attitude, s, p)
+    airspeed, alpha, beta, sine, cosine, ua, va, wa, slowness = air_data(x, attitude, s, p)
     qbar = 0.5*density*airspeed*airspeed
     half = 0.5*slowness
     pa, qa, ra = x.p - s.gust_p, x.q - s.gust_q, x.r - s.gust_r
@@ -91,7 +92,7 @@ def forces(x, attitude: tuple, s, c, p) -> tuple:
     low = p.span*p.span/(p.span*p.span + height*height)
 
     axial_left, axial_right, lift_left, lift_right, rest_x, rest_z, cm = longitudinal(
-        alpha, sine, qhat, left, right, tail, ct, low, arrival, x, c, p)
+        alpha, sine, cosine, qhat, left, right, tail, ct, low, arrival, x, c, p)
     cy, cl, cn = lateral(alpha, beta, phat, rhat, 0.5*(left + right), x, c, p)
     # a stalled tailplane keeps only the download it had at the onset
     cm -= tail*p.Cm_alpha_tail*(alpha_tail + c.alpha_tail_stall)
