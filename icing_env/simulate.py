@@ -20,7 +20,7 @@ from icing_env.dynamics import air_data, present_aircraft
 from icing_env.frames import direction_cosines
 from icing_env.ice_protection import advance_protection
 from icing_env.integrate import STAGES, TOGETHER, TRIAL, copy, rk4
-from icing_env.jit import entry, kernel
+from icing_env.jit import bound, entry, kernel
 from icing_env.parameters import PARAMETERS
 from icing_env.sensors import hold_filter_constants, read_instruments, start_instruments
 from icing_env.turbulence import advance_turbulence, start_turbulence
@@ -125,10 +125,10 @@ class Fleet:
     def _bind(self) -> None:
         """Arguments of each slice, made once: building views costs more than the flight."""
         shared = len(self.parameters) == 1
-        self._arguments = [
-            (self.state[k], stage, self.measurement[k], self.current[k],
+        self._calls = [
+            bound(advance, self.state[k], stage, self.measurement[k], self.current[k],
              self.parameters if shared else self.parameters[k], self.command[k], self.outcome[k],
-             self.substeps, self.dt, *self.clocks)
+                  self.substeps, self.dt, *self.clocks)
             for k, stage in zip(self._slices, self._stages, strict=True)
         ]
 
@@ -146,9 +146,9 @@ class Fleet:
     def step(self) -> None:
         """Advance every aircraft by one environment step under its command."""
         if self._pool is None:
-            advance(*self._arguments[0])
+            self._calls[0]()
         else:
-            list(self._pool.map(lambda arguments: advance(*arguments), self._arguments))
+            list(self._pool.map(lambda call: call(), self._calls))
 
     def memory(self) -> int:
         """Bytes held by the arrays."""

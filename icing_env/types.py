@@ -260,3 +260,19 @@ ADVISORY_FIELDS: list[Field] = [
 ]
 ESTIMATE = structured(ESTIMATE_FIELDS)
 ADVISORY = structured(ADVISORY_FIELDS, ("memory", "f8"), ("since_detection", "f8"))
+
+# What an autopilot is to hold.
+TARGET_FIELDS: list[Field] = [
+    ("pitch_mode", "0..2", "0 holds theta, 1 altitude, 2 climb_rate"),
+    ("theta", "rad", "pitch angle to hold"),
+    ("altitude", "m", "pressure altitude to hold"),
+    ("climb_rate", "m/s", "vertical speed to hold, positive up"),
+    ("speed_mode", "0..1", "0 sets throttle, 1 holds airspeed"),
+    ("throttle", "0..1", "power lever to set"),
+    ("airspeed", "m/s", "true airspeed to hold"),
+    ("roll_mode", "0..1", "0 holds phi, 1 heading"),
+    ("phi", "rad", "bank angle to hold"),
+    ("heading", "rad", "heading to hold"),
+    ("flap", "rad", "flap to set"),
+]
+TARGET = structured(TARGET_FIELDS)

@@ -1,0 +1,123 @@
+"""The flat observation: which channels in which order, with units and finite bounds.
+
+Measurements, estimates and advice only. Estimates are given over the clean aircraft's value (1 is clean), errors are
+what is asked less what is measured.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icing_env.jit import entry
+from icing_env.types import ADVISORY, ESTIMATE, MEASUREMENT
+
+Source = Literal["measurement", "task", "estimate", "advisory"]
+Axes = Literal["all", "longitudinal", "lateral"]
+TURN = math.pi
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One number of the observation."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    source: Source
+    axes: Axes = "all"  # "all": in every environment; else only where that axis is flown
+
+
+def _m(name: str, unit: str, low: float, high: float, axes: Axes = "all") -> Channel:
+    return Channel(name, unit, low, high, "measurement", axes)
+
+
+CHANNELS: tuple[Channel, ...] = (
+    _m("airspeed", "m/s", 0.0, 150.0),
+    _m("altitude", "m", -1000.0, 12000.0),
+    _m("alpha", "rad", -1.0, 1.0),
+    _m("q", "rad/s", -3.0, 3.0, "longitudinal"),
+    _m("theta", "rad", -TURN, TURN),
+    _m("ax", "m/s2", -50.0, 50.0, "longitudinal"),
+    _m("az", "m/s2", -100.0, 100.0),
+    _m("elevator", "rad", -1.0, 1.0, "longitudinal"),
+    _m("throttle_left", "0..1", 0.0, 1.0),
+    _m("throttle_right", "0..1", 0.0, 1.0),
+    _m("flap", "rad", 0.0, 1.0),
+    _m("beta", "rad", -1.0, 1.0, "lateral"),
+    _m("p", "rad/s", -5.0, 5.0, "lateral"),
+    _m("r", "rad/s", -3.0, 3.0, "lateral"),
+    _m("phi", "rad", -2.0*TURN, 2.0*TURN),
+    _m("ay", "m/s2", -50.0, 50.0, "lateral"),
+    _m("aileron", "rad", -1.0, 1.0, "lateral"),
+    _m("rudder", "rad", -1.0, 1.0, "lateral"),
+    _m("temperature", "K", 150.0, 350.0),
+    Channel("altitude_error", "m", -2000.0, 2000.0, "task", "longitudinal"),
+    Channel("climb_rate_error", "m/s", -100.0, 100.0, "task", "longitudinal"),
+    Channel("airspeed_error", "m/s", -150.0, 150.0, "task", "longitudinal"),
+    Channel("heading_error", "rad", -TURN, TURN, "task", "lateral"),
+    Channel("bank_error", "rad", -3.0*TURN, 3.0*TURN, "task", "lateral"),
+    *(Channel(name, "1", -10.0, 10.0, "estimate", axes) for name, axes in (
+        ("CL_alpha", "all"), ("Cm_alpha", "longitudinal"), ("Cm_q", "longitudinal"), ("Cm_elevator", "longitudinal"),
+        ("Cl_p", "lateral"), ("Cl_aileron", "lateral"), ("Cn_beta", "lateral"), ("Cn_rudder", "lateral"))),
+    Channel("excess_drag", "1", -1.0, 1.0, "estimate"),
+    Channel("excitation_longitudinal", "0..1", 0.0, 1.0, "estimate", "longitudinal"),
+    Channel("excitation_lateral", "0..1", 0.0, 1.0, "estimate", "lateral"),
+    Channel("health", "0/1", 0.0, 1.0, "estimate"),
+    *(Channel(name, unit, low, high, "advisory") for name, unit, low, high in (
+        ("severity", "1", 0.0, 5.0), ("confidence", "0..1", 0.0, 1.0), ("ice_detected", "0/1", 0.0, 1.0),
+        ("boots_wing", "0/1", 0.0, 1.0), ("boots_tail", "0/1", 0.0, 1.0), ("boots_vtail_struts", "0/1", 0.0, 1.0),
+        ("prop_heat", "0/1", 0.0, 1.0), ("alpha_limit", "rad", -2.0, 2.0), ("airspeed_limit", "m/s", 0.0, 150.0),
+        ("bank_limit", "rad", 0.0, TURN), ("flap_limit", "rad", 0.0, 2.0), ("intervention", "rad", -1.0, 1.0))),
+)  # fmt: skip
+SOURCES: tuple[Source, ...] = ("measurement", "task", "estimate", "advisory")
+
+
+def channels(axes: Axes) -> tuple[Channel, ...]:
+    """Channels of an environment that flies these axes, in order."""
+    return tuple(c for c in CHANNELS if axes == "all" or c.axes in ("all", axes))
+
+
+class Observer:
+    """Gathers observations of `n` aircraft into one float32 array [n, channels]."""
+
+    def __init__(self, axes: Axes, n: int, task_dtype: np.dtype, clean: NDArray):
+        self.channels = channels(axes)
+        names = {"measurement": MEASUREMENT.names, "task": task_dtype.names, "estimate": ESTIMATE.names,
+                 "advisory": ADVISORY.names}
+        self.source = np.array([SOURCES.index(c.source) for c in self.channels])
+        self.index = np.array([(names[c.source] or ()).index(c.name) for c in self.channels])
+        self.low = np.array([c.low for c in self.channels], np.float32)
+        self.high = np.array([c.high for c in self.channels], np.float32)
+        self.gain = np.array([
+            1.0/float(clean[c.name][0]) if c.source == "estimate" and "_" in c.name and c.name[0] == "C" else 1.0
+            for c in self.channels])
+        self.out = np.zeros((n, len(self.channels)), np.float32)
+
+    def gather(self, measurement: NDArray, task: NDArray, estimate: NDArray, advisory: NDArray) -> NDArray:
+        """Fill and return the observation array; arguments are float64 views [n, fields] of the structured arrays."""
+        gather(measurement, task, estimate, advisory, self.source, self.index, self.gain, self.low, self.high, self.out)
+        return self.out
+
+
+@entry
+def gather(measurement, task, estimate, advisory, source, index, gain, low, high, out) -> None:
+    """Copy, scale and clip every channel of every row; a value that is no number becomes the lower bound."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            k = index[j]
+            if source[j] == 0:
+                value = measurement[i, k]
+            elif source[j] == 1:
+                value = task[i, k]
+            elif source[j] == 2:
+                value = estimate[i, k]
+            else:
+                value = advisory[i, k]
+            value = np.float32(value*gain[j])
+            out[i, j] = min(max(value, low[j]), high[j]) if value == value else low[j]

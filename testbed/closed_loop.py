@@ -1,0 +1,89 @@
+"""The composition root of flight: observer, ice management, autopilot and protection around the aircraft.
+
+Order within a step: steer (autopilot), protect (ice protection, then limits), fly, observe (estimator, ice management).
+Everyone sees measurements, estimates and the clean aircraft's numbers; nobody sees the truth.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers import autopilot, envelope_protection, ice_management
+from estimators import hinf, hinf_memory, hinf_tuning
+from estimators.airframe import airframe_from
+from estimators.hinf_rows import PARAMETER_NAMES
+from icing_env.types import ESTIMATE, ESTIMATED_NAMES, TARGET
+
+
+class ClosedLoop:
+    """Observer and controllers of `n` aircraft (an `icing_env.loop.Loop`).
+
+    Args:
+        n: number of aircraft.
+        clean: PARAMETERS row of the clean aircraft, what everyone believes it to be.
+        dt: step [s].
+        observer: estimate derivatives in flight; else the estimates stay those of the clean aircraft.
+        management: find ice, move the limits, and operate ice protection where `boots` says so.
+        protection: limit commands to the limits.
+        boots: let the ice management switch boots and propeller heat.
+    """
+
+    def __init__(self, n: int, clean: NDArray, dt: float, *, observer: bool = True, management: bool = True,
+                 protection: bool = True, boots: bool = True):
+        self.dt, self.clean = dt, clean[:1].copy()
+        self.observing, self.managing, self.protecting, self.boots = observer, management, protection, boots
+        self.airframe = airframe_from(self.clean)
+        self.tuning, self.gains = hinf_tuning.load_tuning(), autopilot.load_gains()
+        self.management_tuning, self.limits = ice_management.load_tuning(), envelope_protection.load_tuning()
+        self.target = np.zeros(n, TARGET)
+        self._fresh_estimate = clean_estimate(self.airframe, self.tuning)
+        self._fresh_observer = hinf_memory.init(self.airframe, self.tuning, 1)
+        self.observer, self.estimate = np.repeat(self._fresh_observer, n), np.repeat(self._fresh_estimate, n)
+        self.advisory, self.autopilot = ice_management.init(n), autopilot.init(n)
+
+    def reset(self, rows: NDArray, measurement: NDArray) -> None:
+        """Begin anew: a clean aircraft is believed, nothing is limited beyond the clean limits."""
+        self.observer[rows], self.estimate[rows] = self._fresh_observer, self._fresh_estimate
+        self.advisory[rows], self.autopilot[rows] = ice_management.init(1), autopilot.init(1)
+        if self.managing:
+            advisory = self.advisory[rows]
+            ice_management.step(advisory, self.estimate[rows], measurement[rows], self.clean, self.management_tuning,
+                                self.dt)
+            self.advisory[rows] = advisory
+
+    def observe(self, measurement: NDArray) -> None:
+        """Estimate from a measurement, then judge the ice."""
+        if self.observing:
+            hinf.step(self.observer, self.estimate, measurement, self.airframe, self.tuning, self.dt)
+        if self.managing:
+            ice_management.step(self.advisory, self.estimate, measurement, self.clean, self.management_tuning, self.dt)
+
+    def steer(self, measurement: NDArray, command: NDArray) -> None:
+        """Fly the targets."""
+        autopilot.step(self.autopilot, command, measurement, self.target, self.advisory, self.gains, self.dt)
+
+    def protect(self, measurement: NDArray, command: NDArray) -> None:
+        """Switch boots and heat, then limit the command."""
+        if self.managing and self.boots:
+            ice_management.operate(command, self.advisory)
+        if self.protecting:
+            envelope_protection.protect(command, self.advisory, measurement, self.estimate, self.clean, self.limits,
+                                        self.dt)
+
+    def memory(self) -> dict[str, NDArray]:
+        """Everything that must be kept to go on later."""
+        return {"estimate": self.estimate, "advisory": self.advisory, "target": self.target,
+                "observer": self.observer, "autopilot": self.autopilot}
+
+
+def clean_estimate(airframe: NDArray, tuning: NDArray) -> NDArray:
+    """ESTIMATE row of an observer that has seen nothing yet: the clean aircraft, with the prior's standard errors."""
+    estimate = np.zeros(1, ESTIMATE)
+    memory = hinf_memory.init(airframe, tuning, 1)
+    for i, name in enumerate(PARAMETER_NAMES):
+        if name in ESTIMATED_NAMES:
+            estimate[name] = memory["theta"][0, i]
+            estimate[f"{name}_std"] = np.sqrt(memory["b3"][0, hinf_memory.DIAGONAL[i]])
+    estimate["health"] = 1.0
+    return estimate
