@@ -75,4 +75,4 @@ def bound(function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
         return partial(function, *arguments)
     signature = tuple(function.typeof_pyval(argument) for argument in arguments)
     function.compile(signature)
-    return partial(function.get_compile_result(signature).entry_point, *arguments)
+    return partial(function.overloads[signature].entry_point, *arguments)
