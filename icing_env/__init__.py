@@ -1,0 +1,1 @@
+"""The world: aircraft, weather, ice, instruments, and the Gymnasium environment."""

@@ -1,0 +1,85 @@
+"""What every verb has in common: its options, and numbers as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
+from inspect import cleandoc
+from pathlib import Path
+from typing import Any
+
+import click
+
+Function = Callable[..., Any]
+
+
+def verb(name: str, example: str, **settings: Any) -> Callable[[Function], click.Command]:
+    """Make a verb of a function: its docstring is the help, `example` ends it, --json and --seed are added.
+
+    The function receives `as_json` (bool) and `seed` (int) beside its own arguments.
+    """
+
+    def decorate(function: Function) -> click.Command:
+        text = f"{cleandoc(function.__doc__ or '')}\n\n\b\nExample:\n  " + example.replace("\n", "\n  ")
+        options = (
+            click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else, on standard output."),
+            click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
+                         help="Seed of all random draws: the same seed, the same result."),
+        )  # fmt: skip
+        for option in reversed(options):
+            function = option(function)
+        return click.command(name, help=text, **settings)(function)
+
+    return decorate
+
+
+def plain(value: Any) -> Any:
+    """`value` in JSON's types: arrays as lists, dataclasses as objects, numbers that are not finite as null.
+
+    Raises:
+        TypeError: there is no such form.
+    """
+    if value is None or isinstance(value, str | bool | int):
+        return value
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    if hasattr(value, "tolist"):  # NumPy's arrays and scalars, without importing NumPy for verbs that need none
+        return plain(value.tolist())
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | set | frozenset):
+        return [plain(item) for item in value]
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"no JSON form for {type(value).__name__}")
+
+
+def print_json(value: Any) -> None:
+    """Print `value` as JSON on standard output."""
+    click.echo(json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False))
+
+
+def print_table(title: str, headers: Mapping[str, str], rows: list[list[str]]) -> None:
+    """Print a table on standard output.
+
+    Args:
+        title: stands above it.
+        headers: "left" or "right" (how the column is set) by heading, in order.
+        rows: cells as text.
+    """
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    for heading, side in headers.items():
+        table.add_column(heading, justify="right" if side == "right" else "left", overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    console = Console()
+    console.width = console.width if console.is_terminal else 120  # a pipe has no width; 80 would fold every row
+    console.print(table)
