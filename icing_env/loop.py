@@ -6,7 +6,8 @@ composition root (`testbed.closed_loop`). All arrays have a row per aircraft.
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,45 +22,52 @@ class Loop(Protocol):
     advisory: NDArray  # ADVISORY [n]
     target: NDArray  # TARGET [n], what the autopilot holds
 
-    def reset(self, rows: NDArray, measurement: NDArray) -> None:
+    def attach(self, measurement: NDArray, command: NDArray) -> None:
+        """Learn where measurements will be found and commands be written: the same arrays in every step."""
+
+    def reset(self, rows: NDArray) -> None:
         """Begin anew in the given rows."""
 
-    def observe(self, measurement: NDArray) -> None:
-        """Take a measurement: estimates and advisory."""
+    def observe(self) -> None:
+        """Take the measurement: estimates and advisory."""
 
-    def steer(self, measurement: NDArray, command: NDArray) -> None:
-        """Let the autopilot write every row of `command` (surfaces, throttles, flap)."""
+    def steer(self) -> None:
+        """Let the autopilot write every row of the command (surfaces, throttles, flap)."""
 
-    def protect(self, measurement: NDArray, command: NDArray) -> None:
-        """Operate ice protection and limit `command`."""
+    def protect(self) -> None:
+        """Operate ice protection and limit the command."""
 
     def memory(self) -> dict[str, NDArray]:
         """Every array that must be kept to go on later (views, not copies)."""
 
 
-class NoLoop:
-    """Nobody observes, manages or protects; the autopilot leaves the command as it is."""
+LoopFactory = Callable[[int, NDArray, float], Loop]  # (n, PARAMETERS of the clean aircraft, dt)
 
-    def __init__(self, n: int):
+
+class NoLoop:
+    """Nobody observes, manages or protects; an autopilot would leave the command as it is."""
+
+    def __init__(self, n: int, clean: NDArray, dt: float):
+        del clean, dt
         self.estimate = np.zeros(n, ESTIMATE)
         self.advisory = np.zeros(n, ADVISORY)
         self.target = np.zeros(n, TARGET)
 
-    def reset(self, rows: NDArray, measurement: NDArray) -> None:
+    def attach(self, measurement: NDArray, command: NDArray) -> None:
+        """Nothing is read or written."""
+
+    def reset(self, rows: NDArray) -> None:
         """Nothing to begin."""
 
-    def observe(self, measurement: NDArray) -> None:
+    def observe(self) -> None:
         """Nothing to estimate."""
 
-    def steer(self, measurement: NDArray, command: NDArray) -> None:
+    def steer(self) -> None:
         """Controls stay where they are."""
 
-    def protect(self, measurement: NDArray, command: NDArray) -> None:
+    def protect(self) -> None:
         """Nothing is limited."""
 
     def memory(self) -> dict[str, NDArray]:
         """The arrays of the interface."""
         return {"estimate": self.estimate, "advisory": self.advisory, "target": self.target}
-
-
-LoopFactory = Any  # callable (n, PARAMETERS of the clean aircraft, dt) -> Loop

@@ -84,9 +84,12 @@ def channels(axes: Axes) -> tuple[Channel, ...]:
 
 
 class Observer:
-    """Gathers observations of `n` aircraft into one float32 array [n, channels]."""
+    """Gathers observations of `n` aircraft into one float32 array [n, channels].
 
-    def __init__(self, axes: Axes, n: int, task_dtype: np.dtype, clean: NDArray):
+    `reference`: ESTIMATE row of the clean aircraft, by which estimates are divided.
+    """
+
+    def __init__(self, axes: Axes, n: int, task_dtype: np.dtype, reference: NDArray):
         self.channels = channels(axes)
         names = {"measurement": MEASUREMENT.names, "task": task_dtype.names, "estimate": ESTIMATE.names,
                  "advisory": ADVISORY.names}
@@ -95,7 +98,7 @@ class Observer:
         self.low = np.array([c.low for c in self.channels], np.float32)
         self.high = np.array([c.high for c in self.channels], np.float32)
         self.gain = np.array([
-            1.0/float(clean[c.name][0]) if c.source == "estimate" and "_" in c.name and c.name[0] == "C" else 1.0
+            1.0/float(reference[c.name][0]) if c.name[0] == "C" and reference[c.name][0] != 0.0 else 1.0
             for c in self.channels])
         self.out = np.zeros((n, len(self.channels)), np.float32)
 

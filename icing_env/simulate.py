@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icing_env.accretion import advance_accretion
-from icing_env.atmosphere import GAS_CONSTANT, pressure
+from icing_env.atmosphere import GAS_CONSTANT, pressure, static_air
 from icing_env.cloud import advance_cloud
 from icing_env.dynamics import air_data, present_aircraft
 from icing_env.frames import direction_cosines
@@ -84,6 +84,8 @@ def start(state, stage, measurement, current, parameters, command, outcome, dt) 
         s, c, p = state[i], current[i], parameters[0 if shared else i]
         x = stage[0, TRIAL]
         copy(x, s)
+        if s.temperature <= 0.0:  # not prescribed
+            s.temperature = static_air(s.altitude)[0] + p.temperature_offset
         present_aircraft(s, p, c)
         start_turbulence(s, p, air_data(x, direction_cosines(x.e0, x.e1, x.e2, x.e3), s, p)[0])
         start_instruments(x, s, c, p, dt)

@@ -13,6 +13,7 @@ from controllers import autopilot, envelope_protection, ice_management
 from estimators import hinf, hinf_memory, hinf_tuning
 from estimators.airframe import airframe_from
 from estimators.hinf_rows import PARAMETER_NAMES
+from icing_env.jit import bound
 from icing_env.types import ESTIMATE, ESTIMATED_NAMES, TARGET
 
 
@@ -34,7 +35,7 @@ class ClosedLoop:
         self.dt, self.clean = dt, clean[:1].copy()
         self.observing, self.managing, self.protecting, self.boots = observer, management, protection, boots
         self.airframe = airframe_from(self.clean)
-        self.tuning, self.gains = hinf_tuning.load_tuning(), autopilot.load_gains()
+        self.tuning, self.gains = hinf_tuning.default_tuning(), autopilot.load_gains()
         self.management_tuning, self.limits = ice_management.load_tuning(), envelope_protection.load_tuning()
         self.target = np.zeros(n, TARGET)
         self._fresh_estimate = clean_estimate(self.airframe, self.tuning)
@@ -42,34 +43,45 @@ class ClosedLoop:
         self.observer, self.estimate = np.repeat(self._fresh_observer, n), np.repeat(self._fresh_estimate, n)
         self.advisory, self.autopilot = ice_management.init(n), autopilot.init(n)
 
-    def reset(self, rows: NDArray, measurement: NDArray) -> None:
+    def attach(self, measurement: NDArray, command: NDArray) -> None:
+        """Bind every part to the arrays it works on."""
+        self.measurement = measurement
+        estimate, advisory, dt = self.estimate, self.advisory, self.dt
+        self._estimate = bound(hinf.step, self.observer, estimate, measurement, self.airframe, self.tuning, dt)
+        self._manage = bound(ice_management.step, advisory, estimate, measurement, self.clean, self.management_tuning,
+                             dt)
+        self._steer = bound(autopilot.step, self.autopilot, command, measurement, self.target, advisory, self.gains, dt)
+        self._operate = bound(ice_management.operate, command, advisory)
+        self._protect = bound(envelope_protection.protect, command, advisory, measurement, estimate, self.clean,
+                              self.limits, dt)
+
+    def reset(self, rows: NDArray) -> None:
         """Begin anew: a clean aircraft is believed, nothing is limited beyond the clean limits."""
         self.observer[rows], self.estimate[rows] = self._fresh_observer, self._fresh_estimate
         self.advisory[rows], self.autopilot[rows] = ice_management.init(1), autopilot.init(1)
         if self.managing:
             advisory = self.advisory[rows]
-            ice_management.step(advisory, self.estimate[rows], measurement[rows], self.clean, self.management_tuning,
-                                self.dt)
+            ice_management.step(advisory, self.estimate[rows], self.measurement[rows], self.clean,
+                                self.management_tuning, self.dt)
             self.advisory[rows] = advisory
 
-    def observe(self, measurement: NDArray) -> None:
-        """Estimate from a measurement, then judge the ice."""
+    def observe(self) -> None:
+        """Estimate from the measurement, then judge the ice."""
         if self.observing:
-            hinf.step(self.observer, self.estimate, measurement, self.airframe, self.tuning, self.dt)
+            self._estimate()
         if self.managing:
-            ice_management.step(self.advisory, self.estimate, measurement, self.clean, self.management_tuning, self.dt)
+            self._manage()
 
-    def steer(self, measurement: NDArray, command: NDArray) -> None:
+    def steer(self) -> None:
         """Fly the targets."""
-        autopilot.step(self.autopilot, command, measurement, self.target, self.advisory, self.gains, self.dt)
+        self._steer()
 
-    def protect(self, measurement: NDArray, command: NDArray) -> None:
+    def protect(self) -> None:
         """Switch boots and heat, then limit the command."""
         if self.managing and self.boots:
-            ice_management.operate(command, self.advisory)
+            self._operate()
         if self.protecting:
-            envelope_protection.protect(command, self.advisory, measurement, self.estimate, self.clean, self.limits,
-                                        self.dt)
+            self._protect()
 
     def memory(self) -> dict[str, NDArray]:
         """Everything that must be kept to go on later."""

@@ -1,0 +1,85 @@
+"""What an action means: surfaces around the trim, or targets for the autopilot; each in [-1, 1].
+
+| axes         | surfaces                            | targets                        |
+|--------------|-------------------------------------|--------------------------------|
+| all          | elevator, aileron, rudder, throttle | climb rate, airspeed, bank     |
+| longitudinal | elevator, throttle                  | climb rate, airspeed           |
+| lateral      | aileron, rudder                     | bank                           |
+
+Zero is the trimmed position at the start of the episode, or level flight at the task's airspeed. What an axis does not
+cover is flown by the autopilot on the task's references.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icing_env.jit import entry
+from icing_env.observation import Axes
+
+Mode = Literal["surfaces", "targets"]
+ELEVATOR, AILERON, RUDDER, THROTTLE = 0.25, 0.29, 0.28, 1.0  # rad, rad, rad, 1: change at full action
+CLIMB_RATE, AIRSPEED, BANK = 8.0, 15.0, math.radians(45.0)  # m/s, m/s, rad at full action
+NAMES: dict[str, tuple[str, ...]] = {
+    "surfaces": ("elevator", "aileron", "rudder", "throttle"),
+    "targets": ("climb_rate", "airspeed", "bank"),
+}
+_AXIS = {"elevator": "longitudinal", "throttle": "longitudinal", "climb_rate": "longitudinal",
+         "airspeed": "longitudinal", "aileron": "lateral", "rudder": "lateral", "bank": "lateral"}
+
+
+def names(mode: Mode, axes: Axes) -> tuple[str, ...]:
+    """Names of the actions, in order."""
+    return tuple(n for n in NAMES[mode] if axes in ("all", _AXIS[n]))
+
+
+def columns(mode: Mode, axes: Axes) -> NDArray[np.int64]:
+    """Column of the action array for each of NAMES[mode], -1 for those that the axes leave out."""
+    kept = names(mode, axes)
+    return np.array([kept.index(n) if n in kept else -1 for n in NAMES[mode]])
+
+
+@entry
+def to_surfaces(action, column, trim, command) -> None:
+    """Surface commands of every row from the action, around the trim."""
+    for i in range(len(command)):
+        c, t = command[i], trim[i]
+        if column[0] >= 0:
+            c.elevator = t.elevator + ELEVATOR*action[i, column[0]]
+        if column[1] >= 0:
+            c.aileron = t.aileron + AILERON*action[i, column[1]]
+        if column[2] >= 0:
+            c.rudder = t.rudder + RUDDER*action[i, column[2]]
+        if column[3] >= 0:
+            throttle = min(max(t.throttle_left + THROTTLE*action[i, column[3]], 0.0), 1.0)
+            c.throttle_left, c.throttle_right = throttle, throttle
+
+
+@entry
+def to_targets(action, column, task, target) -> None:
+    """Autopilot targets of every row from the action."""
+    for i in range(len(target)):
+        g, k = target[i], task[i]
+        if column[0] >= 0:
+            g.pitch_mode, g.climb_rate = 2.0, CLIMB_RATE*action[i, column[0]]
+        if column[1] >= 0:
+            g.airspeed = k.start_airspeed + AIRSPEED*action[i, column[1]]
+        if column[2] >= 0:
+            g.roll_mode, g.phi = 0.0, BANK*action[i, column[2]]
+
+
+@entry
+def first_bad_row(action, low: float, high: float) -> int:
+    """Clip the actions in place; index of the first row that holds something not finite, or -1 (nothing changed)."""
+    for i in range(action.shape[0]):
+        for j in range(action.shape[1]):
+            if not math.isfinite(action[i, j]):
+                return i
+    for i in range(action.shape[0]):
+        for j in range(action.shape[1]):
+            action[i, j] = min(max(action[i, j], low), high)
+    return -1
