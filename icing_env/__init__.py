@@ -1,1 +1,5 @@
-"""The world: aircraft, weather, ice, instruments, and the Gymnasium environment."""
+"""The world: aircraft, weather, ice, instruments, and the Gymnasium environments."""
+
+from icing_env.registration import register
+
+register()

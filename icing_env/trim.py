@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from icing_env.atmosphere import pressure
 from icing_env.dynamics import derivative, forces, present_aircraft
 from icing_env.actuators import floated
-from icing_env.errors import InputError
+from icing_env.errors import InputError, nearest
 from icing_env.frames import direction_cosines, euler_angles, quaternion, to_body, to_local
+from icing_env.integrate import copy
 from icing_env.jit import entry, kernel
 from icing_env.propulsion import power_available
-from icing_env.types import COMMAND, CONTINUOUS, CURRENT, STATE, Field, structured
+from icing_env.types import COMMAND, CONTINUOUS, CURRENT, STATE, SURFACES, Field, structured
 from icing_env.wind import wind
 
 CONDITION_FIELDS: list[Field] = [
@@ -37,6 +38,10 @@ CONDITION_FIELDS: list[Field] = [
 CONDITION = structured(CONDITION_FIELDS)
 TOLERANCE = 1e-10  # m/s2 and rad/s2
 UNKNOWNS = 8
+ITERATIONS = 40
+DIFFERENCE = 1e-6  # rad, or share of power
+LARGEST_STEP = 0.3  # rad, or share of power: keeps the search within the range of the aerodynamics
+SMALLEST_PIVOT = 1e-12
 
 
 @kernel
@@ -85,10 +90,63 @@ def command_of(x, s, c, u, p) -> None:
     u.flap = x.flap
 
 
+@kernel
+def eliminate(a, b) -> bool:
+    """Solve a x = b in place by Gaussian elimination with row pivoting (Golub & Van Loan, algorithm 3.4.1); x is in `b`.
+
+    Returns False when a pivot vanishes or is not a number, instead of an exception that would end a whole batch.
+    """
+    n = len(b)
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > abs(a[best, k]):
+                best = i
+        if not abs(a[best, k]) > SMALLEST_PIVOT:
+            return False
+        for j in range(k, n):
+            a[k, j], a[best, j] = a[best, j], a[k, j]
+        b[k], b[best] = b[best], b[k]
+        for i in range(k + 1, n):
+            share = a[i, k]/a[k, k]
+            for j in range(k, n):
+                a[i, j] -= share*a[k, j]
+            b[i] -= share*b[k]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            b[k] -= a[k, j]*b[j]
+        b[k] /= a[k, k]
+    return True
+
+
+@kernel
+def guess(z, k, p) -> None:
+    """Start of the search: cruise, banked for the turn."""
+    z[:] = 0.0
+    z[0], z[3] = 0.03, 0.03 + k.climb_angle
+    z[2] = math.atan(k.airspeed*k.turn_rate/p.gravity_sea_level)
+    z[7] = 0.5
+
+
+@kernel
+def differentiate(z, out, jacobian, trial, moved, x, dx, s, c, k, u, p) -> None:
+    """Jacobian of the residual `out` at the unknowns `z`, by forward differences; `trial`, `moved` are scratch."""
+    for j in range(UNKNOWNS):
+        trial[:] = z
+        trial[j] += DIFFERENCE
+        residual(trial, moved, x, dx, s, c, k, u, p)
+        for m in range(UNKNOWNS):
+            jacobian[m, j] = (moved[m] - out[m])*(1.0/DIFFERENCE)
+
+
 @entry
-def solve_rows(state, state_rows, current, command, condition, parameters, stage, rows, left_over) -> None:
-    """Trim every row: its condition, its ice, its parameters. `left_over` receives the largest residual."""
-    z, out, trial = np.zeros(UNKNOWNS), np.zeros(UNKNOWNS), np.zeros(UNKNOWNS)
+def solve_rows(state, current, command, condition, parameters, stage, left_over) -> None:
+    """Trim every row: its condition, its ice, its parameters.
+
+    `left_over` receives the largest residual; infinity where Newton's method has no way to go on.
+    """
+    z, out = np.zeros(UNKNOWNS), np.zeros(UNKNOWNS)
+    trial, moved = np.zeros(UNKNOWNS), np.zeros(UNKNOWNS)
     jacobian = np.zeros((UNKNOWNS, UNKNOWNS))
     shared = len(parameters) == 1
     for i in range(len(state)):
@@ -96,28 +154,20 @@ def solve_rows(state, state_rows, current, command, condition, parameters, stage
         p = parameters[0 if shared else i]
         s.gust_u, s.gust_v, s.gust_w, s.gust_p, s.gust_q, s.gust_r, s.gust_w_tail = 0., 0., 0., 0., 0., 0., 0.
         present_aircraft(s, p, c)
-        z[:] = 0.0
-        z[0] = z[3] = 0.03
-        z[2] = math.atan(k.airspeed*k.turn_rate/p.gravity_sea_level)
-        z[3] += k.climb_angle
-        z[7] = 0.5
-        for _ in range(40):
+        guess(z, k, p)
+        for _ in range(ITERATIONS):
             residual(z, out, stage[0], stage[1], s, c, k, u, p)
             left_over[i] = np.max(np.abs(out))
             if left_over[i] < TOLERANCE:
                 break
-            for j in range(UNKNOWNS):
-                trial[:] = z
-                trial[j] += 1e-6
-                residual(trial, jacobian[j], stage[0], stage[1], s, c, k, u, p)
-                for m in range(UNKNOWNS):
-                    jacobian[j, m] = (jacobian[j, m] - out[m])*1e6
-            step = np.linalg.solve(jacobian.T, out)
-            z -= step*min(1.0, 0.3/max(np.max(np.abs(step)), 1e-12))
+            differentiate(z, out, jacobian, trial, moved, stage[0], stage[1], s, c, k, u, p)
+            if not eliminate(jacobian, out):  # `out` becomes the step
+                left_over[i] = np.inf
+                break
+            z -= out*min(1.0, LARGEST_STEP/max(np.max(np.abs(out)), 1e-12))
         place(z, stage[0], s, k, u, p)
         command_of(stage[0], s, c, u, p)
-        for j in range(rows.shape[1]):
-            state_rows[i, j] = rows[0, j]
+        copy(s, stage[0])
 
 
 @dataclass(frozen=True)
@@ -139,10 +189,16 @@ class Trim:
 
 
 def conditions(n: int = 1, **values: float | NDArray) -> NDArray:
-    """CONDITION array of `n` rows: level flight at 72 m/s and 2200 m, both engines, changed by `values`."""
+    """CONDITION array of `n` rows: level flight at 72 m/s and 2200 m, both engines, changed by `values`.
+
+    Raises:
+        InputError: a value is no field of CONDITION; the nearest is named.
+    """
     k = np.zeros(n, CONDITION)
     k["airspeed"], k["altitude"], k["share_left"], k["share_right"] = 72.0, 2200.0, 1.0, 1.0
     for name, value in values.items():
+        if name not in CONDITION.names:
+            raise InputError(f"no condition '{name}' to trim to: {nearest(name, list(CONDITION.names))}")
         k[name] = value
     return k
 
@@ -150,10 +206,8 @@ def conditions(n: int = 1, **values: float | NDArray) -> NDArray:
 def trim_rows(state: NDArray, current: NDArray, command: NDArray, condition: NDArray, parameters: NDArray) -> NDArray:
     """Trim many aircraft in place; returns the largest residual of each (below 1e-8: trimmed) [n]."""
     stage = np.zeros(2, CONTINUOUS)
-    rows = stage.view(np.float64).reshape(2, -1)
     left_over = np.zeros(len(state))
-    solve_rows(state, state.view(np.float64).reshape(len(state), -1), current, command, condition, parameters,
-               stage, rows, left_over)
+    solve_rows(state, current, command, condition, parameters, stage, left_over)
     return left_over
 
 
@@ -171,20 +225,34 @@ def trim(parameters: NDArray, eta: dict[str, float] | None = None, **condition: 
     k = conditions(**condition)
     state, command, current = np.zeros(1, STATE), np.zeros(1, COMMAND), np.zeros(1, CURRENT)
     for surface, value in (eta or {}).items():
+        if surface not in SURFACES:
+            raise InputError(f"no surface '{surface}' to carry ice: {nearest(surface, list(SURFACES))}")
         state[f"eta_{surface}"] = value
     left_over = trim_rows(state, current, command, k, parameters)[0]
+    throttle = check(state[0], command[0], k[0], parameters[0], float(left_over))
     x = state[0]
-    throttle = max(float(command["throttle_left"][0]), float(command["throttle_right"][0]))
-    where = f"{k['airspeed'][0]:.0f} m/s, {k['altitude'][0]:.0f} m, climb {math.degrees(k['climb_angle'][0]):.1f} deg"
-    if not left_over < 1e-8:
-        raise InputError(f"no steady flight at {where}: try a higher airspeed or less ice")
-    if not 0.0 <= throttle <= 1.0:
-        raise InputError(f"steady flight at {where} needs {100*throttle:.0f} % power: climb less or fly slower")
-    for surface in ("elevator", "aileron", "rudder"):
-        low, high = float(parameters[f"{surface}_min"][0]), float(parameters[f"{surface}_max"][0])
-        if not low <= x[surface] <= high:
-            raise InputError(f"steady flight at {where} needs {surface} {math.degrees(x[surface]):.1f} deg, beyond travel")
-    e = (float(x["e0"]), float(x["e1"]), float(x["e2"]), float(x["e3"]))
-    phi, theta, _ = euler_angles(*e)
+    phi, theta, _ = euler_angles(float(x["e0"]), float(x["e1"]), float(x["e2"]), float(x["e3"]))
     return Trim(state, command, current, k, float(x["alpha_downwash"]), float(k["beta"][0]), phi, theta,
                 float(x["elevator"]), float(x["aileron"]), float(x["rudder"]), throttle)
+
+
+def check(x: np.void, u: np.void, k: np.void, p: np.void, left_over: float) -> float:
+    """Power lever (0..1) of a solution of `trim_rows`: rows of state, command, condition and parameters.
+
+    Raises:
+        InputError: no solution, or one that the aircraft cannot fly.
+    """
+    where = f"{k['airspeed']:.0f} m/s, {k['altitude']:.0f} m, climb {math.degrees(k['climb_angle']):.1f} deg"
+    if not left_over < 1e-8:
+        raise InputError(f"no steady flight at {where}: try a higher airspeed, less bank or less ice")
+    side = "left" if k["share_left"] > 0.0 else "right"
+    throttle = float(u[f"throttle_{side}"]/k[f"share_{side}"])
+    if throttle > 1.0:
+        raise InputError(f"steady flight at {where} needs {100*throttle:.0f} % power: climb less or fly slower")
+    if throttle < 0.0:
+        raise InputError(f"steady flight at {where} needs {100*throttle:.0f} % power: descend less or fly faster")
+    for surface in ("elevator", "aileron", "rudder"):
+        if not p[f"{surface}_min"] <= x[surface] <= p[f"{surface}_max"]:
+            degrees = math.degrees(x[surface])
+            raise InputError(f"steady flight at {where} needs {surface} {degrees:.1f} deg: beyond its travel")
+    return throttle

@@ -10,7 +10,7 @@ import numpy as np
 
 Field = tuple[str, str, str]  # name, unit, meaning
 
-# What the Runge-Kutta step integrates. First in STATE, in this order.
+# What the Runge-Kutta step integrates.
 CONTINUOUS_FIELDS: list[Field] = [
     ("north", "m", "position north of the start"),
     ("east", "m", "position east of the start"),
@@ -214,7 +214,8 @@ def structured(fields: list[Field], *extra: tuple[str, str]) -> np.dtype:
 
 
 CONTINUOUS = structured(CONTINUOUS_FIELDS)
-STATE = structured(STATE_FIELDS, ("step", "i8"), ("seed", "u8"))
+# The integers come first: a type that merely went on after CONTINUOUS would pass for one in numba.
+STATE = np.dtype([("step", "i8"), ("seed", "u8"), *structured(STATE_FIELDS).descr])
 COMMAND = structured(COMMAND_FIELDS)
 MEASUREMENT = structured(MEASUREMENT_FIELDS)
 CURRENT = structured(CURRENT_FIELDS)

@@ -52,7 +52,8 @@ class World:
         self.steps = np.zeros(n, np.int64)
         self.limit = round(scenario.duration/dt)
         self.doublets = schedule(scenario.doublets())
-        self.observer = Observer(axes, n, TASK, self.loop.estimate[:1].copy())
+        self.clean_estimate = self.loop.estimate[:1].copy()
+        self.observer = Observer(axes, n, TASK, self.clean_estimate)
         self.action = np.zeros((n, len(actions.names(mode, axes)) if mode else 0))
         self._bind(mode, axes)
 
@@ -218,6 +219,17 @@ class World:
     def observation(self) -> NDArray[np.float32]:
         """Observations [n, channels]; the array is written anew in each step."""
         return self.observer.out
+
+    def frame(self, row: int) -> NDArray[np.uint8]:
+        """Primary flight display of one aircraft, [height, width, 3]; what its instruments and advisers say."""
+        from icing_env.display import DisplayView, draw
+
+        clean, target = self.clean_estimate[0], self.loop.target[row]
+        view = DisplayView.from_rows(
+            self.fleet.measurement[row], self.loop.advisory[row], self.loop.estimate[row],
+            (float(clean["CL_alpha"]) or 1.0, float(clean["Cm_alpha"]) or 1.0), float(self.clean["alpha_stall"][0]),
+            (float(target["airspeed"]), float(target["altitude"]), float(target["heading"])))
+        return draw(view)
 
     @property
     def terminated(self) -> NDArray[np.bool_]:

@@ -1,0 +1,38 @@
+"""The environments with everything in them: what the registered ids make."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numpy.typing import NDArray
+
+from icing_env.env import TwinOtterEnv
+from icing_env.loop import LoopFactory, NoLoop
+from icing_env.vector_env import TwinOtterVectorEnv
+from testbed.closed_loop import ClosedLoop
+
+
+def loop_factory(observer: bool = True, management: bool = True, protection: bool = True,
+                 boots: bool = True) -> LoopFactory:
+    """What closes the loop, by its parts; see `testbed.closed_loop.ClosedLoop`."""
+
+    def make_loop(n: int, clean: NDArray, dt: float) -> ClosedLoop:
+        return ClosedLoop(n, clean, dt, observer=observer, management=management, protection=protection, boots=boots)
+
+    return make_loop
+
+
+def _loop(options: dict[str, Any]) -> LoopFactory:
+    parts = {name: options.pop(name, True) for name in ("observer", "management", "protection", "boots")}
+    bare = options.get("mode", "surfaces") == "surfaces" and options.get("axes", "all") == "all"
+    return NoLoop if bare and not any(parts.values()) else loop_factory(**parts)
+
+
+def make(**options: Any) -> TwinOtterEnv:
+    """One aircraft. Options: those of `TwinOtterEnv`, and observer, management, protection, boots (all True)."""
+    return TwinOtterEnv(loop=_loop(options), **options)
+
+
+def make_vector(num_envs: int = 1, **options: Any) -> TwinOtterVectorEnv:
+    """Many aircraft. Options: those of `TwinOtterVectorEnv`, and observer, management, protection, boots."""
+    return TwinOtterVectorEnv(num_envs, loop=_loop(options), **options)
