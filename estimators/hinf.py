@@ -8,9 +8,9 @@ A standard error is the square root of the diagonal of B3: one standard deviatio
 unmodelled accelerations and the measurement errors are white with the densities d^2, n^2 and n_a^2 of the tuning.
 A finite gamma inflates it, by at most (1 - gamma^-2)^(-1/2).
 
-The moment channels learn, and parameters are allowed to wander, only as far as pilot or autopilot move the aircraft:
-gusts alone would drag Cm_alpha and Cm_q towards a false ice alarm. The forces have accelerometers, which feel a gust
-as the vanes do, and are always live; CL_alpha wanders with the activity of alpha, CD_0 and CL_0 always.
+Channels learn, and their parameters are allowed to wander, only while they are excited (`hinf_excitation`): gusts and
+an autopilot's answer to them would drag Cm_alpha and Cm_q towards a false ice alarm, noise would lower CL_alpha in
+calm air. Drag is always live.
 """
 
 from __future__ import annotations
@@ -60,19 +60,17 @@ def remember(ob: Any, seat: bool) -> None:
 
 
 @kernel
-def learn_all(ob: Any, tn: Any, longitudinal: float, lateral: float, lively: float, dt: float) -> bool:
+def learn_all(ob: Any, tn: Any, excited: tuple[float, float, float, float], dt: float) -> bool:
     """All six channels over one sample: state row, accelerometer row, wandering. False if any of them failed.
 
-    Gated channels take data in, and wander, only as far as they are excited.
+    excited: shares of pitch, turn, lift and side. A channel takes data in, and wanders, as far as it is excited.
     """
     theta, b3, gain = ob["theta"], ob["b3"], ob["gain"]
     kappa = 1.0 - 1.0 / (tn["gamma"] * tn["gamma"])
-    pitching = dt * gate(longitudinal, tn["share_low"], tn["share_high"])
-    turning = dt * gate(lateral, tn["share_low"], tn["share_high"])
-    lifting = dt * (lively if tn["share_high"] > 0.0 else 1.0)
-    heard = (dt, dt, pitching, dt, turning, turning)
-    wander = (dt, lifting, pitching, turning, turning, turning)
-    wander_first = (dt, dt, pitching, turning, turning, turning)
+    low, high = tn["share_low"], tn["share_high"]
+    pitch, turn, lift, side = excited
+    turning = dt * gate(turn, low, high)
+    heard = (dt, dt * gate(lift, low, high), dt * gate(pitch, low, high), dt * gate(side, low, high), turning, turning)
     good = True
     for c in range(6):
         first, packed, m = FIRST[c], PACKED[c], COUNT[c]
@@ -86,7 +84,7 @@ def learn_all(ob: Any, tn: Any, longitudinal: float, lateral: float, lively: flo
             information = heard[c] / (tn["accelerometer"][a] * tn["accelerometer"][a])
             good &= learn(theta, b3, gain, first, packed, m, ob["filtered"], factor, target, information, kappa)
         k0 = tn["k0"][c]
-        forget(b3, ob["scale"], first, packed, m, k0 * wander[c], k0 * wander_first[c], tn["q0"][c])
+        forget(b3, ob["scale"], first, packed, m, k0 * heard[c], tn["q0"][c])
     return good
 
 
@@ -144,11 +142,12 @@ def observe(ob: Any, est: Any, m: Any, af: Any, tn: Any, dt: float) -> None:
         ob["seated"] = 0.0
         return
     moment_rows(ob, m, af, force_rows(ob, m, af, dt))
-    excite(ob, m, af, tn["window"], dt)
-    longitudinal, lateral, lively = shares(ob, tn, af)
     if ob["seated"] > 0.0:
         advance_filters(ob, tn, dt)
-        good = learn_all(ob, tn, longitudinal, lateral, lively, dt)
+    excite(ob, af, tn["window"], dt)
+    excited = shares(ob, tn, af)
+    if ob["seated"] > 0.0:
+        good = learn_all(ob, tn, excited, dt)
         if not (good and healthy(ob)):
             ob["failed"] = 1.0
             return
@@ -156,7 +155,7 @@ def observe(ob: Any, est: Any, m: Any, af: Any, tn: Any, dt: float) -> None:
         ob["excess_drag"] += min(1.0, dt / tn["drag_smoothing"]) * (excess - ob["excess_drag"])
     remember(ob, ob["seated"] == 0.0)
     ob["seated"] = 1.0
-    report(ob, est, longitudinal, lateral)
+    report(ob, est, excited[0], excited[1])
 
 
 @entry

@@ -40,7 +40,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from icing_env.jit import kernel
+from icing_env.jit import block, kernel
 
 
 @kernel
@@ -68,7 +68,7 @@ def shrink(strength: float, kappa: float) -> float:
     return math.exp(-math.log1p(kappa * strength) / kappa)
 
 
-@kernel
+@block
 def learn(
     theta: Any, b3: Any, gain: Any, first: int, packed: int, m: int,
     row: Any, factor: float, target: float, information: float, kappa: float,
@@ -105,15 +105,12 @@ def learn(
 
 
 @kernel
-def forget(
-    b3: Any, scale: Any, first: int, packed: int, m: int, wander: float, wander_first: float, q0: float
-) -> None:
+def forget(b3: Any, scale: Any, first: int, packed: int, m: int, wander: float, q0: float) -> None:
     """Add K0 dt to the diagonal of B3, never beyond its starting value scale^2/q0 (no wind-up in calm air).
 
-    wander: K0 dt per scale^2 of all parameters but the first of the channel, wander_first: of that one.
+    wander: K0 dt per scale^2.
     """
     for i in range(m):
         k = packed + i * (i + 1) // 2 + i
         unit = scale[first + i] * scale[first + i]
-        added = (wander_first if i == 0 else wander) * unit
-        b3[k] += max(0.0, min(added, unit / q0 - b3[k]))
+        b3[k] += max(0.0, min(wander * unit, unit / q0 - b3[k]))

@@ -26,7 +26,7 @@ OBSERVER = np.dtype([
     ("felt", "f8", (3,)), ("felt_before", "f8", (3,)), ("factor", "f8", (3,)),  # from the accelerometers, see hinf_rows
     ("felt_filtered", "f8", (3,)),  # `felt` behind the observer's filter
     ("gain", "f8", (6,)), ("deviation", "f8", (26,)),  # scratch; standard errors
-    ("mean", "f8", (7,)), ("energy", "f8", (5,)),  # of the excitation measures
+    ("mean", "f8", (7,)), ("energy", "f8", (7,)),  # of the excitation measures
     ("excess_drag", "f8"),
     ("seated", "f8"),  # 0: the next readable sample starts the filters
     ("failed", "f8"),  # 1: a matrix lost its positive definiteness; estimates are held from then on

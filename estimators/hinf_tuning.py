@@ -14,7 +14,9 @@ from icing_env.configuration import folder
 from icing_env.errors import InputError, nearest
 
 CHANNELS = ("drag", "lift", "pitch", "side", "roll", "yaw")
-_NUMBERS = ("gamma", "window", "share_low", "share_high", "control_floor", "alpha_floor", "drag_smoothing")
+_NUMBERS = (
+    "gamma", "window", "share_low", "share_high", "control_floor", "incidence_floor", "gust_weight", "drag_smoothing",
+)  # fmt: skip
 _PER_CHANNEL = ("d", "n", "q0", "k0")
 
 TUNING = np.dtype(
