@@ -27,6 +27,7 @@ AIRFRAME_FIELDS: list[Field] = [
 AIRFRAME = structured(AIRFRAME_FIELDS)
 CORRECTIONS = ("vane_lag", "boom_gain")  # of the instruments: none where they are not stated, as in flight records
 
+
 def published_airframe(aircraft: str | Path = "twin_otter") -> np.ndarray:
     """The clean airframe as `configs/aircraft` states it, with the sources there (`AIRFRAME` array of one row)."""
     sections = [entries for entries in read_toml("aircraft", aircraft).values() if isinstance(entries, dict)]

@@ -70,8 +70,17 @@ def shrink(strength: float, kappa: float) -> float:
 
 @block
 def learn(
-    theta: Any, b3: Any, gain: Any, first: int, packed: int, m: int,
-    row: Any, factor: float, target: float, information: float, kappa: float,
+    theta: Any,
+    b3: Any,
+    gain: Any,
+    first: int,
+    packed: int,
+    m: int,
+    row: Any,
+    factor: float,
+    target: float,
+    information: float,
+    kappa: float,
 ) -> bool:
     """Advance thetahat and B3 over one sample of one row of data, r = factor row[first:first + m], in place.
 

@@ -79,21 +79,24 @@ def force_rows(ob: Any, m: Any, af: Any, dt: float) -> float:
     cx = af["CX_0"] + alpha * (af["CX_alpha"] + alpha * af["CX_alpha2"])
     known = k * (cx + clean_zero_lift_drag(af) * ca) + thrust
     row[0] = -k * ca * ca * cb
-    rest[0] = ca * cb * known + sb * m["ay"] + sa * cb * m["az"] + GRAVITY * (
-        sb * sp * ct + sa * cb * cp * ct - ca * cb * st)
+    rest[0] = (
+        ca * cb * known + sb * m["ay"] + sa * cb * m["az"] + GRAVITY * (sb * sp * ct + sa * cb * cp * ct - ca * cb * st)
+    )
     ob["felt"][0], ob["factor"][0] = (m["ax"] - known) * ca * cb, 1.0 / (ca * cb)
 
     lift = -k / (v * cb)
     row[1], row[2], row[3], row[4] = lift, lift * alpha, lift * half_chord * q, lift * m["elevator"]
-    rest[1] = q - sb / cb * (p * ca + r * sa) + (
-        GRAVITY * (sa * st + ca * cp * ct) - thrust * sa) / (v * cb)
+    rest[1] = q - sb / cb * (p * ca + r * sa) + (GRAVITY * (sa * st + ca * cp * ct) - thrust * sa) / (v * cb)
     ob["felt"][1], ob["factor"][1] = (m["az"] * ca - (m["ax"] - thrust) * sa) / (v * cb), v * cb
 
     side = k * cb / v
     row[9], row[10], row[11] = side, side * beta, side * half_span * p
     row[12], row[13] = side * half_span * r, side * m["rudder"]
-    rest[3] = p * sa - r * ca + (-sb * (m["ax"] * ca + m["az"] * sa) + GRAVITY * (
-        ca * sb * st + cb * sp * ct - sa * sb * cp * ct)) / v
+    rest[3] = (
+        p * sa
+        - r * ca
+        + (-sb * (m["ax"] * ca + m["az"] * sa) + GRAVITY * (ca * sb * st + cb * sp * ct - sa * sb * cp * ct)) / v
+    )
     ob["felt"][2], ob["factor"][2] = m["ay"] * cb / v, v / cb
     ob["y"][0], ob["y"][1], ob["y"][3] = v, alpha, beta
     return float(qbar)

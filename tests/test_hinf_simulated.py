@@ -15,7 +15,7 @@ from estimators.hinf_tuning import default_tuning
 from icing_env import aircraft
 from icing_env.simulate import Fleet
 from icing_env.trim import trim
-from icing_env.types import ADVISORY, ESTIMATE, ESTIMATED_NAMES, SURFACES
+from icing_env.types import ADVISORY, ESTIMATE, ESTIMATED_NAMES, SURFACES, TARGET
 
 DT, AIRSPEED, ALTITUDE = 0.02, 72.0, 2200.0
 
@@ -35,7 +35,7 @@ def fly(
         fleet.current[i] = trimmed.current[0]
     fleet.state["seed"], fleet.state["temperature"] = np.arange(n) + 5, 263.0
     fleet.start()
-    pilot, target, advisory = autopilot.init(n), np.zeros(n, autopilot.TARGET), np.zeros(n, ADVISORY)
+    pilot, target, advisory = autopilot.init(n), np.zeros(n, TARGET), np.zeros(n, ADVISORY)
     for mode in ("pitch_mode", "speed_mode", "roll_mode"):
         target[mode] = 1
     target["altitude"], target["airspeed"] = ALTITUDE, AIRSPEED
