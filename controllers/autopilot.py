@@ -31,7 +31,7 @@ from controllers.kernels import air_density, airspeed_of, airspeed_rate, clip, i
 from controllers.parameters import read_parameters
 from icing_env.atmosphere import G0
 from icing_env.jit import entry, kernel
-from icing_env.types import TARGET, Field, structured
+from icing_env.types import TARGET, Field, structured  # noqa: F401  (TARGET: what `step` takes)
 
 AUTOPILOT_FIELDS: list[Field] = [
     ("engaged", "0/1", "0 until the first step, which starts the integrators where the controls are"),

@@ -13,7 +13,7 @@ cover is flown by the autopilot on the task's references.
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +44,7 @@ def columns(mode: Mode, axes: Axes) -> NDArray[np.int64]:
 
 
 @entry
-def to_surfaces(action, column, trim, command) -> None:
+def to_surfaces(action: Any, column: Any, trim: Any, command: Any) -> None:
     """Surface commands of every row from the action, around the trim."""
     for i in range(len(command)):
         c, t = command[i], trim[i]
@@ -60,7 +60,7 @@ def to_surfaces(action, column, trim, command) -> None:
 
 
 @entry
-def to_targets(action, column, task, target) -> None:
+def to_targets(action: Any, column: Any, task: Any, target: Any) -> None:
     """Autopilot targets of every row from the action."""
     for i in range(len(target)):
         g, k = target[i], task[i]
@@ -73,7 +73,7 @@ def to_targets(action, column, task, target) -> None:
 
 
 @entry
-def first_bad_row(action, low: float, high: float) -> int:
+def first_bad_row(action: Any, low: float, high: float) -> int:
     """Clip the actions in place; index of the first row that holds something not finite, or -1 (nothing changed)."""
     for i in range(action.shape[0]):
         for j in range(action.shape[1]):

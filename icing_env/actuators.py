@@ -12,6 +12,8 @@ moments; in ordinary flight they stay below the limit and the surface goes where
 
 from __future__ import annotations
 
+from typing import Any
+
 from icing_env.jit import kernel
 from icing_env.types import Field
 
@@ -46,14 +48,14 @@ ACTUATOR_PARAMETERS: list[Field] = [
 
 
 @kernel
-def elevator_hinge_moment(dynamic_pressure: float, alpha_tail: float, tail: float, x, p) -> float:
+def elevator_hinge_moment(dynamic_pressure: float, alpha_tail: float, tail: float, x: Any, p: Any) -> float:
     """Elevator hinge moment [N m], positive trailing edge down; `tail`: separated share of the tailplane."""
     return dynamic_pressure*p.hinge_elevator_volume*(
         p.hinge_elevator_delta*x.elevator + p.hinge_elevator_alpha*alpha_tail + p.hinge_elevator_stall*tail)
 
 
 @kernel
-def aileron_hinge_moment(dynamic_pressure: float, left: float, right: float, x, p) -> float:
+def aileron_hinge_moment(dynamic_pressure: float, left: float, right: float, x: Any, p: Any) -> float:
     """Aileron hinge moment [N m], positive rolls left; a separated half wing draws its own aileron up."""
     return dynamic_pressure*p.hinge_aileron_volume*(
         p.hinge_aileron_delta*x.aileron + p.hinge_aileron_stall*(left - right))

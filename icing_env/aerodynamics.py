@@ -12,6 +12,8 @@ half wing blends over to a flat plate, so that stall, its asymmetry and the roll
 
 from __future__ import annotations
 
+from typing import Any
+
 from icing_env.jit import kernel
 from icing_env.types import DERIVATIVE_NAMES, Field
 
@@ -65,26 +67,26 @@ def smootherstep(x: float) -> float:
 
 
 @kernel
-def separation(alpha: float, onset: float, c, p) -> float:
+def separation(alpha: float, onset: float, c: Any, p: Any) -> float:
     """Separated share, 0..1, of a half wing at its local angle of attack (upright and inverted stall)."""
     return smootherstep(max(alpha - onset, -alpha - p.alpha_stall_negative)*c.per_stall_width)
 
 
 @kernel
-def tail_angle(alpha: float, arrival: float, q: float, slowness: float, x, p) -> float:
+def tail_angle(alpha: float, arrival: float, q: float, slowness: float, x: Any, p: Any) -> float:
     """Angle of attack at the tailplane [rad]: downwash of the past, pitch rate, and the gust that arrives there now."""
     return (alpha + arrival - p.downwash_slope*x.alpha_downwash - p.downwash_flap*x.flap + p.tail_incidence
             + q*p.tail_arm*slowness)
 
 
 @kernel
-def longitudinal(alpha: float, sine: float, cosine: float, qhat: float, left: float, right: float, tail: float, ct: float, low: float,
-                 arrival: float, x, c, p) -> tuple:
+def longitudinal(alpha: float, sine: float, cosine: float, qhat: float, left: float, right: float, tail: float,
+                 ct: float, low: float, arrival: float, x: Any, c: Any, p: Any) -> tuple:
     """CX, CZ of the left and right half wing (each referred to the whole area), the rest of CX and CZ, and Cm.
 
-    `sine`, `cosine`: of alpha; `left`, `right`, `tail`: separated shares; `ct`: thrust coefficient less its reference; `low`: 0 in
-    free air, 1 at the ground (McCormick, Aerodynamics, Aeronautics and Flight Mechanics, 2nd ed., section 7: induced
-    drag times (16 h/b)^2/(1 + (16 h/b)^2)); `arrival`: gust angle at the tail less that at the wing [rad].
+    `sine`, `cosine`: of alpha; `left`, `right`, `tail`: separated shares; `ct`: thrust coefficient less its reference;
+    `low`: 0 in free air, 1 at the ground (McCormick, Aerodynamics, Aeronautics and Flight Mechanics, 2nd ed., section
+    7: induced drag times (16 h/b)^2/(1 + (16 h/b)^2)); `arrival`: gust angle at the tail less that at the wing [rad].
     """
     plate = -sine/(0.283 + 0.222*abs(sine))
     suction = alpha*(c.CX_alpha + c.CX_alpha2*alpha)
@@ -96,7 +98,8 @@ def longitudinal(alpha: float, sine: float, cosine: float, qhat: float, left: fl
     flap_lift = (1.0 - 0.5*(left + right))*p.CL_flap*x.flap
     flap_drag = p.CD_flap*x.flap + p.induced_drag*flap_lift*(flap_lift - 2.0*lift)
     rest_x = flap_lift*sine - flap_drag*cosine + low*p.induced_drag*lift*lift
-    rest_z = -flap_lift*cosine - flap_drag*sine + c.CZ_q*qhat + c.CZ_elevator*x.elevator + p.CZ_CT*ct + low*p.ground_lift*lift
+    rest_z = -flap_lift*cosine - flap_drag*sine + c.CZ_q*qhat + c.CZ_elevator*x.elevator + p.CZ_CT*ct
+    rest_z += low*p.ground_lift*lift
     share = 0.5*(left + right)
     lag = 0.5*p.Cm_alphadot*p.chord*c.per_tail_arm*(alpha - x.alpha_downwash)
     cm = (c.Cm_0 + c.Cm_alpha*((1.0 - share)*alpha + share*p.Cm_alpha_separated*sine)
@@ -107,7 +110,7 @@ def longitudinal(alpha: float, sine: float, cosine: float, qhat: float, left: fl
 
 
 @kernel
-def lateral(alpha: float, beta: float, phat: float, rhat: float, share: float, x, c, p) -> tuple:
+def lateral(alpha: float, beta: float, phat: float, rhat: float, share: float, x: Any, c: Any, p: Any) -> tuple:
     """CY, Cl and Cn of the symmetric wing; `share` is the mean separated share."""
     loss = 1.0 - p.damping_separated*share
     cy = p.CY_0 + c.CY_beta*beta + c.CY_p*phat + c.CY_r*rhat + c.CY_rudder*x.rudder

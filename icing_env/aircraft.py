@@ -14,7 +14,6 @@ from icing_env.errors import InputError, nearest
 from icing_env.parameters import GROUPS, PARAMETERS, UNITS
 
 
-
 def load(
     aircraft: str | Path = "twin_otter",
     *,

@@ -10,6 +10,7 @@ are now (ice included), `p` the parameters, `u` the command.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from icing_env.actuators import aileron_hinge_moment, elevator_hinge_moment, floated, surface_rate
 from icing_env.aerodynamics import CT_MAX, lateral, longitudinal, separation, smootherstep, tail_angle
@@ -25,7 +26,7 @@ AIRSPEED_FLOOR = 0.1524  # m/s (0.5 ft/s), floor of the normalised rates (NASA/T
 
 
 @kernel
-def present_aircraft(s, p, c) -> None:
+def present_aircraft(s: Any, p: Any, c: Any) -> None:
     """The aircraft of this step: coefficients and mass with the ice it carries, and reciprocals for the equations."""
     iced_aircraft(s, p, c)
     c.per_mass, c.per_inertia_yy = 1.0/c.mass, 1.0/p.inertia_yy
@@ -40,7 +41,7 @@ def present_aircraft(s, p, c) -> None:
 
 
 @kernel
-def air_data(x, attitude: tuple, s, p) -> tuple:
+def air_data(x: Any, attitude: tuple, s: Any, p: Any) -> tuple:
     """Airspeed [m/s], alpha, beta [rad], sine and cosine of alpha, air velocity along body x, y, z, 1/airspeed.
 
     Inertial velocity less wind less gust; `attitude`: the direction cosines.
@@ -60,7 +61,7 @@ def air_data(x, attitude: tuple, s, p) -> tuple:
 
 
 @kernel
-def forces(x, attitude: tuple, s, c, p) -> tuple:
+def forces(x: Any, attitude: tuple, s: Any, c: Any, p: Any) -> tuple:
     """Aerodynamic and propulsive force [N] and moment about the c.g. [N m], and what instruments and controls need.
 
     Returns: Fx, Fy, Fz, L, M, N, airspeed, alpha, beta, density, thrust left, thrust right, elevator and aileron hinge
@@ -113,7 +114,8 @@ def forces(x, attitude: tuple, s, c, p) -> tuple:
 
 
 @kernel
-def rigid_body(x, attitude: tuple, dx, fx, fy, fz, roll, pitch, yaw, c, p) -> None:
+def rigid_body(x: Any, attitude: tuple, dx: Any, fx: float, fy: float, fz: float, roll: float, pitch: float,
+               yaw: float, c: Any, p: Any) -> None:
     """Newton and Euler: rates of velocity, attitude, rotation and position from force [N] and moment [N m]."""
     g = gravity(x.altitude, p.gravity_sea_level, p.earth_radius)
     dx.u = x.r*x.v - x.q*x.w + attitude[2]*g + fx*c.per_mass
@@ -134,7 +136,8 @@ def rigid_body(x, attitude: tuple, dx, fx, fy, fz, roll, pitch, yaw, c, p) -> No
 
 
 @kernel
-def controls_and_engines(x, dx, u, hinge_e, hinge_a, static, c, p) -> None:
+def controls_and_engines(x: Any, dx: Any, u: Any, hinge_e: float, hinge_a: float, static: float, c: Any,
+                         p: Any) -> None:
     """Rates of the surfaces, the flap and the shaft powers."""
     dx.elevator = surface_rate(
         x.elevator,
@@ -155,7 +158,7 @@ def controls_and_engines(x, dx, u, hinge_e, hinge_a, static, c, p) -> None:
 
 
 @block
-def derivative(x, dx, s, c, p, u) -> None:
+def derivative(x: Any, dx: Any, s: Any, c: Any, p: Any, u: Any) -> None:
     """Rates of the whole continuous state, written into `dx`."""
     attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
     (fx, fy, fz, roll, pitch, yaw, airspeed, alpha, _beta, _density, _left, _right,

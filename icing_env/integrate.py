@@ -7,6 +7,8 @@ Each aircraft's arithmetic is the same in any company.
 
 from __future__ import annotations
 
+from typing import Any
+
 from icing_env.dynamics import derivative
 from icing_env.jit import kernel
 
@@ -18,7 +20,7 @@ WEIGHT = (1.0/6.0, 1.0/3.0, 1.0/3.0, 1.0/6.0)
 
 
 @kernel
-def move(out, start, slope, h: float) -> None:
+def move(out: Any, start: Any, slope: Any, h: float) -> None:
     """out = start + h slope."""
     out.north = start.north + h*slope.north
     out.east = start.east + h*slope.east
@@ -43,7 +45,7 @@ def move(out, start, slope, h: float) -> None:
 
 
 @kernel
-def copy(out, x) -> None:
+def copy(out: Any, x: Any) -> None:
     """out = x, field by field; `x` may be a longer record that begins with the same fields."""
     out.north = x.north
     out.east = x.east
@@ -68,7 +70,7 @@ def copy(out, x) -> None:
 
 
 @kernel
-def normalise(x) -> None:
+def normalise(x: Any) -> None:
     """Bring the quaternion back to unit length."""
     scale = 1.0/(x.e0*x.e0 + x.e1*x.e1 + x.e2*x.e2 + x.e3*x.e3)**0.5
     x.e0 *= scale
@@ -78,7 +80,8 @@ def normalise(x) -> None:
 
 
 @kernel
-def rk4(stage, first: int, count: int, state, current, parameters, shared: bool, command, dt: float) -> None:
+def rk4(stage: Any, first: int, count: int, state: Any, current: Any, parameters: Any, shared: bool, command: Any,
+        dt: float) -> None:
     """Advance `count` aircraft from row `first` by `dt`; gusts, ice and commands are held.
 
     `stage` [TOGETHER, 4]: the continuous state goes in and comes out in TRIAL; the rest is scratch.

@@ -1,9 +1,9 @@
 """How the physics is compiled: three decorators over numba's `njit`.
 
 `kernel` marks a scalar building block; it is compiled into whatever calls it (a call costs more than most of their
-arithmetic). `block` marks a large piece called from several places; it stays a function of its own. `entry` marks a function that
-Python calls: it releases the GIL and is cached on disk. Numba's own cache looks only at the file of the entry
-itself, so that a change in a file it calls would run stale code; ours lives in a folder named by a hash of every
+arithmetic). `block` marks a large piece called from several places; it stays a function of its own. `entry` marks a
+function that Python calls: it releases the GIL and is cached on disk. Numba's own cache looks only at the file of the
+entry itself, so that a change in a file it calls would run stale code; ours lives in a folder named by a hash of every
 source file that can hold a kernel, so that a changed source can never meet an old binary.
 
 Division follows IEEE 754 (`error_model="numpy"`): a check for zero at each division would cost a third of a step.
@@ -65,7 +65,7 @@ def entry(function: F) -> F:
         config.CACHE_DIR = before
 
 
-def bound(function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
+def bound(function: Any, *arguments: Any) -> Callable[[], Any]:
     """An `entry` tied to its arguments: the types are looked up once instead of at each call.
 
     A call then costs 0.04 us an argument instead of 0.11. The arguments are kept, not copied; arrays must stay where

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from icing_env.errors import InputError, nearest
 from icing_env.frames import direction_cosines, euler_angles, quaternion
 from icing_env.jit import entry
 from icing_env.trim import Trim
-from icing_env.types import COMMAND, CONTINUOUS, CONTINUOUS_FIELDS
+from icing_env.types import CONTINUOUS, CONTINUOUS_FIELDS
 
 if TYPE_CHECKING:
     from control import StateSpace
@@ -33,13 +33,13 @@ LATERAL = ("beta", "p", "r", "phi")
 
 
 @entry
-def rates(stage, s, c, p, u) -> None:
+def rates(stage: Any, s: Any, c: Any, p: Any, u: Any) -> None:
     """Rates of the continuous state in row 0 into row 1 (from Python)."""
     derivative(stage[0], stage[1], s[0], c[0], p[0], u[0])
 
 
 @entry
-def flow(stage, s, p) -> tuple:
+def flow(stage: Any, s: Any, p: Any) -> tuple:
     """Airspeed, alpha, beta of row 0."""
     return air_data(stage[0], direction_cosines(stage[0].e0, stage[0].e1, stage[0].e2, stage[0].e3), s[0], p[0])[:3]
 
@@ -47,7 +47,7 @@ def flow(stage, s, p) -> tuple:
 class Plant:
     """The compiled plant as x_dot = f(x, u) in the book's states, around one trim; wind and gusts as in the trim."""
 
-    def __init__(self, trim: Trim, parameters: NDArray):
+    def __init__(self, trim: Trim, parameters: NDArray) -> None:
         self.trim, self.parameters = trim, parameters
         self.state, self.current, self.command = trim.state.copy(), trim.current.copy(), trim.command.copy()
         self.stage = np.zeros(2, CONTINUOUS)

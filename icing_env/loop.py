@@ -47,7 +47,7 @@ LoopFactory = Callable[[int, NDArray, float], Loop]  # (n, PARAMETERS of the cle
 class NoLoop:
     """Nobody observes, manages or protects; an autopilot would leave the command as it is."""
 
-    def __init__(self, n: int, clean: NDArray, dt: float):
+    def __init__(self, n: int, clean: NDArray, dt: float) -> None:
         del clean, dt
         self.estimate = np.zeros(n, ESTIMATE)
         self.advisory = np.zeros(n, ADVISORY)

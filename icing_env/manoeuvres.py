@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +46,7 @@ def schedule(doublets: tuple[Doublet, ...]) -> NDArray[np.float64]:
 
 
 @entry
-def excite(command, measurement, rows) -> None:
+def excite(command: Any, measurement: Any, rows: Any) -> None:
     """Add the doublets that are due now to the surface commands of every row."""
     for i in range(len(command)):
         for k in range(rows.shape[0]):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,10 @@ def _m(name: str, unit: str, low: float, high: float, axes: Axes = "all") -> Cha
     return Channel(name, unit, low, high, "measurement", axes)
 
 
+DERIVATIVES: dict[str, Axes] = {
+    "CL_alpha": "all", "Cm_alpha": "longitudinal", "Cm_q": "longitudinal", "Cm_elevator": "longitudinal",
+    "Cl_p": "lateral", "Cl_aileron": "lateral", "Cn_beta": "lateral", "Cn_rudder": "lateral",
+}  # fmt: skip
 CHANNELS: tuple[Channel, ...] = (
     _m("airspeed", "m/s", 0.0, 150.0),
     _m("altitude", "m", -1000.0, 12000.0),
@@ -62,9 +66,7 @@ CHANNELS: tuple[Channel, ...] = (
     Channel("airspeed_error", "m/s", -150.0, 150.0, "task", "longitudinal"),
     Channel("heading_error", "rad", -TURN, TURN, "task", "lateral"),
     Channel("bank_error", "rad", -3.0*TURN, 3.0*TURN, "task", "lateral"),
-    *(Channel(name, "1", -10.0, 10.0, "estimate", axes) for name, axes in (
-        ("CL_alpha", "all"), ("Cm_alpha", "longitudinal"), ("Cm_q", "longitudinal"), ("Cm_elevator", "longitudinal"),
-        ("Cl_p", "lateral"), ("Cl_aileron", "lateral"), ("Cn_beta", "lateral"), ("Cn_rudder", "lateral"))),
+    *(Channel(name, "1", -10.0, 10.0, "estimate", axes) for name, axes in DERIVATIVES.items()),
     Channel("excess_drag", "1", -1.0, 1.0, "estimate"),
     Channel("excitation_longitudinal", "0..1", 0.0, 1.0, "estimate", "longitudinal"),
     Channel("excitation_lateral", "0..1", 0.0, 1.0, "estimate", "lateral"),
@@ -89,7 +91,7 @@ class Observer:
     `reference`: ESTIMATE row of the clean aircraft, by which estimates are divided.
     """
 
-    def __init__(self, axes: Axes, n: int, task_dtype: np.dtype, reference: NDArray):
+    def __init__(self, axes: Axes, n: int, task_dtype: np.dtype, reference: NDArray) -> None:
         self.channels = channels(axes)
         names = {"measurement": MEASUREMENT.names, "task": task_dtype.names, "estimate": ESTIMATE.names,
                  "advisory": ADVISORY.names}
@@ -109,7 +111,8 @@ class Observer:
 
 
 @entry
-def gather(measurement, task, estimate, advisory, source, index, gain, low, high, out) -> None:
+def gather(measurement: Any, task: Any, estimate: Any, advisory: Any, source: Any, index: Any, gain: Any, low: Any,
+           high: Any, out: Any) -> None:
     """Copy, scale and clip every channel of every row; a value that is no number becomes the lower bound."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from icing_env.atmosphere import P0
 from icing_env.jit import kernel
@@ -32,20 +33,20 @@ PROPULSION_PARAMETERS: list[Field] = [
 
 
 @kernel
-def power_available(pressure: float, p) -> float:
+def power_available(pressure: float, p: Any) -> float:
     """Shaft power [W] of one engine at full throttle and a static pressure [Pa]."""
     loss = 1.0 - pressure*(1.0/P0)
     return p.power_rated*(1.0 - loss*(p.power_lapse + p.power_lapse2*loss))
 
 
 @kernel
-def thrust_per_power(airspeed: float, c, p) -> float:
+def thrust_per_power(airspeed: float, c: Any, p: Any) -> float:
     """Thrust of one propeller per shaft power [N/W] at an axial airspeed [m/s]."""
     vs = p.propeller_static_speed
     return c.efficiency*p.propeller_efficiency/math.sqrt(airspeed*airspeed + vs*vs)
 
 
 @kernel
-def torque(power: float, p) -> float:
+def torque(power: float, p: Any) -> float:
     """Shaft torque [N m] at the governed speed."""
     return power*60.0/(2.0*math.pi*p.propeller_rpm)

@@ -6,6 +6,7 @@ One TOML file under configs/scenarios/, checked key by key; everything has a def
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
 
@@ -187,7 +188,8 @@ def _merged(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
 def _check(scenario: Scenario) -> None:
     where = f"scenario '{scenario.name}'"
     aircraft.check_names([*scenario.parameters, *scenario.randomise.parameters])
-    for name, values in {**scenario.effects, **scenario.randomise.effects}.items():
+    changed: dict[str, Iterable[str]] = {**scenario.effects, **scenario.randomise.effects}
+    for name, values in changed.items():
         valid = [p.name for p in effects.get(name).parameters]
         for key in values:
             if key not in valid:

@@ -13,6 +13,7 @@ measured = (1 + scale) x (truth behind lag, boom and filter) + bias + noise
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from icing_env.atmosphere import pressure_altitude
 from icing_env.dynamics import forces
@@ -50,7 +51,7 @@ def lag_gain(dt: float, time_constant: float) -> float:
 
 
 @kernel
-def hold_filter_constants(s, p, dt: float) -> None:
+def hold_filter_constants(s: Any, p: Any, dt: float) -> None:
     """Constants of lags, low pass and boom for a step `dt`; the boom's are its exact transition matrix."""
     s.gain_pitot, s.gain_vane = lag_gain(dt, p.pitot_lag), lag_gain(dt, p.vane_lag)
     s.gain_filter = 1.0 - math.exp(-2.0*math.pi*p.filter_frequency*dt)
@@ -65,7 +66,7 @@ def hold_filter_constants(s, p, dt: float) -> None:
 
 
 @kernel
-def advance_boom(s, p, drive: float) -> None:
+def advance_boom(s: Any, p: Any, drive: float) -> None:
     """Nose boom as a damped oscillator under a normal acceleration [m/s2] held over the step."""
     rest = p.boom_gain*drive
     away, rate = s.boom_position - rest, s.boom_rate
@@ -74,7 +75,7 @@ def advance_boom(s, p, drive: float) -> None:
 
 
 @kernel
-def start_instruments(x, s, c, p, dt: float) -> None:
+def start_instruments(x: Any, s: Any, c: Any, p: Any, dt: float) -> None:
     """Settle every lag and filter on the present flight condition."""
     hold_filter_constants(s, p, dt)
     attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
@@ -88,7 +89,8 @@ def start_instruments(x, s, c, p, dt: float) -> None:
 
 
 @kernel
-def filter_flow_and_inertial(x, s, c, p, airspeed, alpha, beta, fx, fy, fz) -> None:
+def filter_flow_and_inertial(x: Any, s: Any, c: Any, p: Any, airspeed: float, alpha: float, beta: float, fx: float,
+                             fy: float, fz: float) -> None:
     """Lags of pitot and vanes, the boom, then the same low pass on every fast channel."""
     cut, per_mass = s.gain_filter, c.per_mass
     offset = p.vane_position_error/max(airspeed, 1.0)
@@ -110,7 +112,7 @@ def filter_flow_and_inertial(x, s, c, p, airspeed, alpha, beta, fx, fy, fz) -> N
 
 
 @kernel
-def read_fast(s, m, p) -> None:
+def read_fast(s: Any, m: Any, p: Any) -> None:
     """Flow, inertial and surface channels: scale, bias and noise (blocks 0 to 3 of the instrument stream)."""
     n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, 0)
     m.airspeed = (1.0 + p.scale_airspeed)*s.pitot + p.bias_airspeed + p.noise_airspeed*n0
@@ -130,7 +132,7 @@ def read_fast(s, m, p) -> None:
 
 
 @kernel
-def read_attitude(x, s, m, p, u) -> float:
+def read_attitude(x: Any, s: Any, m: Any, p: Any, u: Any) -> float:
     """Attitude (heading kept continuous), flap and levers (block 3); returns a noise to spare."""
     phi, theta, psi = euler_angles(x.e0, x.e1, x.e2, x.e3)
     turn = psi - m.psi
@@ -145,7 +147,8 @@ def read_attitude(x, s, m, p, u) -> float:
 
 
 @kernel
-def read_engines_and_navigation(x, attitude: tuple, s, m, p, thrust_left, thrust_right, hinge_e, hinge_a, static,
+def read_engines_and_navigation(x: Any, attitude: tuple, s: Any, m: Any, p: Any, thrust_left: float,
+                                thrust_right: float, hinge_e: float, hinge_a: float, static: float,
                                 noise: float) -> None:
     """Engines, hinge moments, static pressure, GPS, ten times a second (block 4)."""
     n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, 4)
@@ -163,7 +166,7 @@ def read_engines_and_navigation(x, attitude: tuple, s, m, p, thrust_left, thrust
 
 
 @kernel
-def read_slow(s, m, p) -> None:
+def read_slow(s: Any, m: Any, p: Any) -> None:
     """Temperature and cloud probes, once a second (block 5)."""
     n0, n1, n2, _n3 = normal4(s.seed, STREAM_SENSORS, s.step, 5)
     m.temperature = s.temperature + p.bias_temperature + p.noise_temperature*n0
@@ -172,7 +175,7 @@ def read_slow(s, m, p) -> None:
 
 
 @kernel
-def read_instruments(x, s, m, c, p, u, o, ten_hertz: bool, one_hertz: bool) -> None:
+def read_instruments(x: Any, s: Any, m: Any, c: Any, p: Any, u: Any, o: Any, ten_hertz: bool, one_hertz: bool) -> None:
     """One sample of every instrument that is due into `m`, and the true air data and load factor into `o`."""
     attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
     (fx, fy, fz, _l, _m, _n, airspeed, alpha, beta, _rho, thrust_left, thrust_right,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +28,8 @@ from icing_env.turbulence import advance_turbulence, start_turbulence
 from icing_env.types import COMMAND, CONTINUOUS, CURRENT, MEASUREMENT, OUTCOME, STATE
 
 
-
 @kernel
-def advance_weather_and_ice(s, p, airspeed: float, dt: float) -> None:
+def advance_weather_and_ice(s: Any, p: Any, airspeed: float, dt: float) -> None:
     """The slow clock: cloud along the track and ice on every surface."""
     advance_cloud(s, p, airspeed, dt)
     density = p.density_factor*pressure(s.altitude)/(GAS_CONSTANT*s.temperature)
@@ -37,7 +37,7 @@ def advance_weather_and_ice(s, p, airspeed: float, dt: float) -> None:
 
 
 @kernel
-def prepare(s, c, p, u, o, dt: float, one_hertz: int) -> None:
+def prepare(s: Any, c: Any, p: Any, u: Any, o: Any, dt: float, one_hertz: int) -> None:
     """What is held over the step: weather and ice (once a second), ice protection, coefficients, gusts."""
     if s.step % one_hertz == 0:
         advance_weather_and_ice(s, p, o.airspeed, dt*one_hertz)
@@ -48,7 +48,7 @@ def prepare(s, c, p, u, o, dt: float, one_hertz: int) -> None:
 
 
 @kernel
-def finish(x, s, m, c, p, u, o, dt: float, ten_hertz: int, one_hertz: int) -> None:
+def finish(x: Any, s: Any, m: Any, c: Any, p: Any, u: Any, o: Any, dt: float, ten_hertz: int, one_hertz: int) -> None:
     """Clock and instruments at the end of the step."""
     one = s.step % one_hertz == 0
     s.step += 1
@@ -57,8 +57,8 @@ def finish(x, s, m, c, p, u, o, dt: float, ten_hertz: int, one_hertz: int) -> No
 
 
 @entry
-def advance(state, stage, measurement, current, parameters, command, outcome,
-            substeps, dt, ten_hertz, one_hertz) -> None:
+def advance(state: Any, stage: Any, measurement: Any, current: Any, parameters: Any, command: Any, outcome: Any,
+            substeps: int, dt: float, ten_hertz: int, one_hertz: int) -> None:
     """One environment step of every row; `parameters` has a row per aircraft or one for all."""
     shared = len(parameters) == 1
     for first in range(0, len(state), TOGETHER):
@@ -77,7 +77,8 @@ def advance(state, stage, measurement, current, parameters, command, outcome,
 
 
 @entry
-def start(state, stage, measurement, current, parameters, command, outcome, dt) -> None:
+def start(state: Any, stage: Any, measurement: Any, current: Any, parameters: Any, command: Any, outcome: Any,
+          dt: float) -> None:
     """After the continuous state was set: settle gusts and instruments and take a first sample."""
     shared = len(parameters) == 1
     for i in range(len(state)):
@@ -108,7 +109,7 @@ class Fleet:
         state, measurement, current, command, outcome: structured arrays of length `n`.
     """
 
-    def __init__(self, parameters: NDArray, n: int = 1, dt: float = 0.02, substeps: int = 2, threads: int = 1):
+    def __init__(self, parameters: NDArray, n: int = 1, dt: float = 0.02, substeps: int = 2, threads: int = 1) -> None:
         if parameters.dtype != PARAMETERS or len(parameters) not in (1, n):
             raise ValueError(f"parameters must be a PARAMETERS array of 1 or {n} rows")
         self.parameters, self.n, self.dt, self.substeps = parameters, n, dt, substeps

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from icing_env.actuators import floated
 from icing_env.atmosphere import pressure
 from icing_env.dynamics import derivative, forces, present_aircraft
-from icing_env.actuators import floated
 from icing_env.errors import InputError, nearest
 from icing_env.frames import direction_cosines, euler_angles, quaternion, to_body, to_local
 from icing_env.integrate import copy
@@ -45,7 +46,7 @@ SMALLEST_PIVOT = 1e-12
 
 
 @kernel
-def place(z, x, s, k, u, p) -> None:
+def place(z: Any, x: Any, s: Any, k: Any, u: Any, p: Any) -> None:
     """Put the continuous state and the command into the condition `k` with the unknowns `z`."""
     alpha, beta, phi, theta = z[0], z[1], z[2], z[3]
     x.altitude, x.flap = k.altitude, k.flap
@@ -66,7 +67,7 @@ def place(z, x, s, k, u, p) -> None:
 
 
 @kernel
-def residual(z, out, x, dx, s, c, k, u, p) -> None:
+def residual(z: Any, out: Any, x: Any, dx: Any, s: Any, c: Any, k: Any, u: Any, p: Any) -> None:
     """Accelerations, climb and sideslip left over in the condition `k` with the unknowns `z`."""
     place(z, x, s, k, u, p)
     derivative(x, dx, s, c, p, u)
@@ -79,7 +80,7 @@ def residual(z, out, x, dx, s, c, k, u, p) -> None:
 
 
 @kernel
-def command_of(x, s, c, u, p) -> None:
+def command_of(x: Any, s: Any, c: Any, u: Any, p: Any) -> None:
     """Surface commands that hold the present positions, gearing, rigging and hinge moments taken out."""
     values = forces(x, direction_cosines(x.e0, x.e1, x.e2, x.e3), s, c, p)
     u.elevator = (x.elevator - p.elevator_offset
@@ -91,8 +92,8 @@ def command_of(x, s, c, u, p) -> None:
 
 
 @kernel
-def eliminate(a, b) -> bool:
-    """Solve a x = b in place by Gaussian elimination with row pivoting (Golub & Van Loan, algorithm 3.4.1); x is in `b`.
+def eliminate(a: Any, b: Any) -> bool:
+    """Solve a x = b in place by Gaussian elimination with row pivoting (Golub & Van Loan, algorithm 3.4.1); x: in `b`.
 
     Returns False when a pivot vanishes or is not a number, instead of an exception that would end a whole batch.
     """
@@ -120,7 +121,7 @@ def eliminate(a, b) -> bool:
 
 
 @kernel
-def guess(z, k, p) -> None:
+def guess(z: Any, k: Any, p: Any) -> None:
     """Start of the search: cruise, banked for the turn."""
     z[:] = 0.0
     z[0], z[3] = 0.03, 0.03 + k.climb_angle
@@ -129,7 +130,8 @@ def guess(z, k, p) -> None:
 
 
 @kernel
-def differentiate(z, out, jacobian, trial, moved, x, dx, s, c, k, u, p) -> None:
+def differentiate(z: Any, out: Any, jacobian: Any, trial: Any, moved: Any, x: Any, dx: Any, s: Any, c: Any, k: Any,
+                  u: Any, p: Any) -> None:
     """Jacobian of the residual `out` at the unknowns `z`, by forward differences; `trial`, `moved` are scratch."""
     for j in range(UNKNOWNS):
         trial[:] = z
@@ -140,7 +142,8 @@ def differentiate(z, out, jacobian, trial, moved, x, dx, s, c, k, u, p) -> None:
 
 
 @entry
-def solve_rows(state, current, command, condition, parameters, stage, left_over) -> None:
+def solve_rows(state: Any, current: Any, command: Any, condition: Any, parameters: Any, stage: Any,
+               left_over: Any) -> None:
     """Trim every row: its condition, its ice, its parameters.
 
     `left_over` receives the largest residual; infinity where Newton's method has no way to go on.
@@ -197,8 +200,8 @@ def conditions(n: int = 1, **values: float | NDArray) -> NDArray:
     k = np.zeros(n, CONDITION)
     k["airspeed"], k["altitude"], k["share_left"], k["share_right"] = 72.0, 2200.0, 1.0, 1.0
     for name, value in values.items():
-        if name not in CONDITION.names:
-            raise InputError(f"no condition '{name}' to trim to: {nearest(name, list(CONDITION.names))}")
+        if name not in (CONDITION.names or ()):
+            raise InputError(f"no condition '{name}' to trim to: {nearest(name, list(CONDITION.names or ()))}")
         k[name] = value
     return k
 
@@ -222,7 +225,7 @@ def trim(parameters: NDArray, eta: dict[str, float] | None = None, **condition: 
     Raises:
         InputError: the aircraft cannot fly steadily so (power, surface travel or lift is short).
     """
-    k = conditions(**condition)
+    k = conditions(1, **condition)
     state, command, current = np.zeros(1, STATE), np.zeros(1, COMMAND), np.zeros(1, CURRENT)
     for surface, value in (eta or {}).items():
         if surface not in SURFACES:

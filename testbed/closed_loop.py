@@ -31,7 +31,7 @@ class ClosedLoop:
     """
 
     def __init__(self, n: int, clean: NDArray, dt: float, *, observer: bool = True, management: bool = True,
-                 protection: bool = True, boots: bool = True):
+                 protection: bool = True, boots: bool = True) -> None:
         self.dt, self.clean = dt, clean[:1].copy()
         self.observing, self.managing, self.protecting, self.boots = observer, management, protection, boots
         self.airframe = airframe_from(self.clean)

@@ -75,7 +75,7 @@ def figure_source(figure: Figure) -> tuple[str, int]:
     svg, png = io.BytesIO(), io.BytesIO()
     # A fixed salt and no date: the same figure gives the same bytes.
     with rc_context({"svg.hashsalt": "report", "svg.fonttype": "path"}):
-        figure.savefig(svg, format="svg", metadata={key: None for key in ("Date", "Creator", "Format", "Type")})
+        figure.savefig(svg, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     figure.savefig(png, format="png", dpi=PNG_DPI, metadata={"Software": None}, pil_kwargs={"optimize": True})
     width = round(figure.get_figwidth() * 96.0)
     if len(svg.getvalue()) <= len(png.getvalue()):

@@ -86,7 +86,7 @@ def test_integrators_do_not_wind_up():
         autopilot.step(a, c, m, t, free(), gains, DT)
     saturated = c.copy()
     assert saturated["elevator"] == gains["elevator_min"] and saturated["throttle_left"] == 1.0
-    m["theta"], m["phi"], m["airspeed"] = 0.40, 0.6, 121.0  # just beyond the targets: surfaces leave their limits at once
+    m["theta"], m["phi"], m["airspeed"] = 0.40, 0.6, 121.0  # just beyond the targets: all leave their limits at once
     autopilot.step(a, c, m, t, free(), gains, DT)
     assert c["elevator"] > saturated["elevator"]
     assert c["aileron"] > saturated["aileron"]

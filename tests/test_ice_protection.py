@@ -12,7 +12,8 @@ from icing_env.types import COMMAND, STATE, SURFACES, structured
 
 PARAMETERS = structured([*ice_protection.PROTECTION_PARAMETERS, ("eta_saturation_other", "1", "")])
 CONFIG = tomllib.loads((Path(__file__).parents[1] / "configs/ice/dhc6.toml").read_text())["ice_protection"]
-GROUPS = {"boots_wing": ("left_wing", "right_wing"), "boots_tail": ("htail",), "boots_vtail_struts": ("vtail", "struts")}
+GROUPS = {"boots_wing": ("left_wing", "right_wing"), "boots_tail": ("htail",),
+          "boots_vtail_struts": ("vtail", "struts")}  # fmt: skip
 
 
 @kernel

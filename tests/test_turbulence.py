@@ -12,7 +12,7 @@ from icing_env.types import STATE, structured
 from icing_env.wind import WIND_PARAMETERS, wind
 
 V, SPAN, ARM = 72.0, 19.81, 7.5
-PARAMETERS = structured(turbulence.TURBULENCE_PARAMETERS + [("span", "m", ""), ("tail_arm", "m", "")])
+PARAMETERS = structured([*turbulence.TURBULENCE_PARAMETERS, ("span", "m", ""), ("tail_arm", "m", "")])
 GUSTS = [f"gust_{name}" for name in ("u", "v", "w", "p", "q", "r", "w_tail")]
 
 

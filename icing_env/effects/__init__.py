@@ -170,7 +170,8 @@ def parse(text: str) -> tuple[str, dict[str, float]]:
         try:
             values[key] = float(number)
         except ValueError:
-            raise InputError(f"effect '{text}': '{part}' is not PARAM=NUMBER, as in {name}:{_example(effect)}") from None
+            right = f"{name}:{_example(effect)}"
+            raise InputError(f"effect '{text}': '{part}' is not PARAM=NUMBER, as in {right}") from None
     return name, values
 
 
