@@ -18,6 +18,7 @@ from icing_env.tasks import REASONS, REWARD_TERMS
 from icing_env.world import World
 
 FPS = 50
+N_TERMS = len(REWARD_TERMS)
 
 
 class TwinOtterEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -41,7 +42,7 @@ class TwinOtterEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def __init__(self, scenario: str | scenarios.Scenario = "clear_air", *, mode: Mode = "surfaces",
                  axes: Axes = "all", loop: LoopFactory = NoLoop, render_mode: str | None = None,
-                 changes: dict[str, Any] | None = None, dt: float = 0.02, substeps: int = 2):
+                 changes: dict[str, Any] | None = None, dt: float = 0.02, substeps: int = 2) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(f"render_mode must be None, 'rgb_array' or 'human', got '{render_mode}'")
         self.world = World(scenarios.load(scenario, **(changes or {})), 1, loop, mode=mode, axes=axes, dt=dt,
@@ -49,7 +50,9 @@ class TwinOtterEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.render_mode = render_mode
         self.observation_space, self.action_space = box_spaces(self.world)
         self._window: Any = None
-        self._row = self.world.task[0]  # a view: read after each step
+        names = self.world.task.dtype.names or ()
+        first, last = names.index(f"reward_{REWARD_TERMS[0]}"), names.index("reason")
+        self._numbers = self.world.task.view(np.float64)[first:last + 1]  # reward terms, their sum, ..., reason
         self._seeded = False
 
     @property
@@ -73,21 +76,16 @@ class TwinOtterEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         else:
             self.world.reset(initial=(options or {}).get("initial"))
         self._show()
-        return self.world.observation[0].copy(), self._info()
+        return self.world.observation[0].copy(), _info(self._numbers.tolist())
 
     def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Fly one step. Raises InputError for an action that is not finite or of the wrong shape."""
-        self.world.step(np.asarray(action, np.float64).reshape(1, -1) if np.ndim(action) == 1 else action)
-        row = self._row
+        self.world.step(np.asarray(action)[None])
         if self.render_mode == "human":
             self._show()
-        return (self.world.observer.out[0].copy(), float(row["reward"]), bool(row["reason"] > 0.0),
-                bool(self.world.steps[0] >= self.world.limit), self._info())
-
-    def _info(self) -> dict[str, Any]:
-        row = self._row
-        return {"reward_terms": {name: float(row[field]) for name, field in REWARD_FIELDS},
-                "reason": REASONS[int(row["reason"])]}
+        numbers = self._numbers.tolist()
+        return (self.world.observer.out[0].copy(), numbers[N_TERMS], numbers[-1] > 0.0,
+                bool(self.world.steps[0] >= self.world.limit), _info(numbers))
 
     def render(self) -> NDArray[np.uint8] | None:
         """Primary flight display: a frame for "rgb_array"; "human" shows it in a window."""
@@ -120,7 +118,8 @@ class TwinOtterEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._seeded = True
 
 
-REWARD_FIELDS = tuple((term, f"reward_{term}") for term in REWARD_TERMS)
+def _info(numbers: list[float]) -> dict[str, Any]:
+    return {"reward_terms": dict(zip(REWARD_TERMS, numbers, strict=False)), "reason": REASONS[int(numbers[-1])]}
 
 
 def box_spaces(world: World) -> tuple[spaces.Box, spaces.Box]:

@@ -9,6 +9,7 @@ reward terms and the end of an episode use the truth, which no observation holds
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -63,7 +64,7 @@ def square(error: float, scale: float) -> float:
 
 
 @kernel
-def refer(k, g, time: float) -> None:
+def refer(k: Any, g: Any, time: float) -> None:
     """Write the references of the moment into the autopilot's target `g`."""
     g.speed_mode, g.roll_mode, g.pitch_mode = 1.0, 1.0, 1.0
     g.altitude, g.airspeed, g.heading = k.start_altitude, k.start_airspeed, k.start_heading
@@ -83,7 +84,7 @@ def refer(k, g, time: float) -> None:
 
 
 @kernel
-def climb_rate(m) -> float:
+def climb_rate(m: Any) -> float:
     """Rate of climb [m/s] in the air mass from measured airspeed, flow angles and attitude."""
     forward = math.cos(m.alpha)*math.cos(m.beta)*math.sin(m.theta)
     side = math.sin(m.beta)*math.sin(m.phi) + math.sin(m.alpha)*math.cos(m.beta)*math.cos(m.phi)
@@ -91,7 +92,7 @@ def climb_rate(m) -> float:
 
 
 @kernel
-def measure_errors(k, g, m) -> None:
+def measure_errors(k: Any, g: Any, m: Any) -> None:
     """Errors of the moment: asked less measured."""
     k.altitude_error = g.altitude - m.altitude
     k.climb_rate_error = g.climb_rate - climb_rate(m)
@@ -101,7 +102,7 @@ def measure_errors(k, g, m) -> None:
 
 
 @kernel
-def judge(k, w, x, o, c, u, p) -> None:
+def judge(k: Any, w: Any, x: Any, o: Any, c: Any, u: Any, p: Any) -> None:
     """Reward terms and the end of the episode, from the truth."""
     margin = min(c.alpha_stall_left, c.alpha_stall_right) + p.alpha_stall_flap*x.flap - o.alpha
     k.reward_alive = w.alive
@@ -121,7 +122,7 @@ def judge(k, w, x, o, c, u, p) -> None:
 
 
 @kernel
-def ending(x, o, p) -> float:
+def ending(x: Any, o: Any, p: Any) -> float:
     """Index in REASONS: ground, structure, upset, or 0 to fly on."""
     if not x.altitude > p.ground_altitude:
         return 1.0
@@ -135,7 +136,7 @@ def ending(x, o, p) -> float:
 
 
 @entry
-def refer_rows(task, target, measurement) -> None:
+def refer_rows(task: Any, target: Any, measurement: Any) -> None:
     """References and errors of every row for the time it is."""
     for i in range(len(task)):
         refer(task[i], target[i], measurement[i].time)
@@ -143,10 +144,12 @@ def refer_rows(task, target, measurement) -> None:
 
 
 @entry
-def judge_rows(task, target, weights, measurement, state, outcome, current, command, parameters) -> None:
-    """After a step: references, errors, rewards and endings of every row."""
+def judge_rows(task: Any, target: Any, weights: Any, measurement: Any, state: Any, outcome: Any, current: Any,
+               command: Any, parameters: Any, steps: Any) -> None:
+    """After a step: its count, references, errors, rewards and endings of every row."""
     shared = len(parameters) == 1
     for i in range(len(task)):
+        steps[i] += 1
         refer(task[i], target[i], measurement[i].time)
         measure_errors(task[i], target[i], measurement[i])
         judge(task[i], weights[0], state[i], outcome[i], current[i], command[i], parameters[0 if shared else i])

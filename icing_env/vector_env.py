@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from icing_env import scenario as scenarios
 from icing_env.actions import Mode
-from icing_env.env import FPS, REWARD_FIELDS, box_spaces
+from icing_env.env import FPS, box_spaces
 from icing_env.errors import InputError
 from icing_env.loop import LoopFactory, NoLoop
 from icing_env.observation import Axes
+from icing_env.tasks import REWARD_TERMS
 from icing_env.world import World
 
 Arrays = tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]
@@ -41,7 +42,7 @@ class TwinOtterVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDA
     def __init__(self, num_envs: int = 1, scenario: str | scenarios.Scenario = "clear_air", *,
                  mode: Mode = "surfaces", axes: Axes = "all", loop: LoopFactory = NoLoop,
                  autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP, render_mode: str | None = None,
-                 changes: dict[str, Any] | None = None, dt: float = 0.02, substeps: int = 2, threads: int = 1):
+                 changes: dict[str, Any] | None = None, dt: float = 0.02, substeps: int = 2, threads: int = 1) -> None:
         self.num_envs, self.render_mode = num_envs, render_mode
         self.world = World(scenarios.load(scenario, **(changes or {})), num_envs, loop, mode=mode, axes=axes, dt=dt,
                            substeps=substeps, threads=threads)
@@ -118,8 +119,8 @@ class TwinOtterVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDA
     def _info(self) -> dict[str, Any]:
         task, here = self.world.task, np.ones(self.num_envs, bool)
         terms: dict[str, Any] = {}
-        for name, field in REWARD_FIELDS:
-            terms[name], terms[f"_{name}"] = task[field].copy(), here
+        for name in REWARD_TERMS:
+            terms[name], terms[f"_{name}"] = task[f"reward_{name}"].copy(), here
         return {"reward_terms": terms, "_reward_terms": here, "reason": task["reason"].astype(np.int64),
                 "_reason": here}
 

@@ -38,7 +38,7 @@ class World:
 
     def __init__(self, scenario: Scenario, n: int = 1, loop: LoopFactory = NoLoop, *,
                  mode: actions.Mode | None = None, axes: Axes = "all", threads: int = 1, dt: float = 0.02,
-                 substeps: int = 2):
+                 substeps: int = 2) -> None:
         self.scenario, self.n, self.dt, self.mode, self.axes = scenario, n, dt, mode, axes
         self.clean, self.true = scenario.clean_parameters(), scenario.true_parameters()
         draws = scenario.randomise
@@ -55,6 +55,7 @@ class World:
         self.clean_estimate = self.loop.estimate[:1].copy()
         self.observer = Observer(axes, n, TASK, self.clean_estimate)
         self.action = np.zeros((n, len(actions.names(mode, axes)) if mode else 0))
+        self.scheduled = bool(scenario.cloud or scenario.events)
         self._bind(mode, axes)
 
     def _bind(self, mode: actions.Mode | None, axes: Axes) -> None:
@@ -65,13 +66,15 @@ class World:
         o = self.observer
         self._gather = bound(gather, *self._views, o.source, o.index, o.gain, o.low, o.high, o.out)
         self._judge = bound(judge_rows, self.task, loop.target, self.weights, f.measurement, f.state, f.outcome,
-                            f.current, f.command, f.parameters)
+                            f.current, f.command, f.parameters, self.steps)
         self._excite = bound(excite, f.command, f.measurement, self.doublets) if len(self.doublets) else None
         self._check = bound(actions.first_bad_row, self.action, -1.0, 1.0)
-        if mode == "surfaces":
-            self._act = bound(actions.to_surfaces, self.action, actions.columns(mode, axes), self.trimmed, f.command)
-        elif mode == "targets":
-            self._act = bound(actions.to_targets, self.action, actions.columns(mode, axes), self.task, loop.target)
+        columns = actions.columns(mode, axes) if mode else None
+        self._to_surfaces = bound(actions.to_surfaces, self.action, columns, self.trimmed, f.command
+                                  ) if mode == "surfaces" else None
+        self._to_targets = bound(actions.to_targets, self.action, columns, self.task, loop.target
+                                 ) if mode == "targets" else None
+        self._fly, self._steer, self._protect, self._observe = f.step, loop.steer, loop.protect, loop.observe
         # the autopilot flies whatever the action leaves open
         self._steered = mode != "surfaces" or axes != "all"
 
@@ -174,41 +177,39 @@ class World:
         """One step of every aircraft.
 
         Args:
-            action: [n, actions] in [-1, 1], or None where the autopilot flies.
+            action: [n, actions] in [-1, 1], or None to let the last one stand (or the autopilot fly).
 
         Raises:
             InputError: an action that is not finite (its row is named, nothing has changed) or of the wrong shape.
         """
-        if self.mode is not None:
+        if action is not None:
             self._take(action)
         if self._steered:
-            self.loop.steer()
-        if self.mode == "surfaces":
-            self._act()
+            self._steer()
+        if self._to_surfaces is not None:
+            self._to_surfaces()
         if self._excite is not None:
             self._excite()
-        self.loop.protect()
-        self.fleet.step()
-        self.steps += 1
-        if (self.scenario.cloud or self.scenario.events) and self.steps.min() % self.fleet.clocks[1] == 0:
+        self._protect()
+        self._fly()
+        if self.scheduled and self.steps[0] % self.fleet.clocks[1] == 0:
             self._follow_schedule(np.arange(self.n))
-        self.loop.observe()
+        self._observe()
         self._judge()
         self._gather()
 
-    def _take(self, action: NDArray | None) -> None:
+    def _take(self, action: NDArray) -> None:
         """Check and store the action; targets reach the autopilot at once."""
-        try:
-            self.action[:] = action
-        except (ValueError, TypeError):
+        if np.shape(action) != self.action.shape:
             raise InputError(f"action must have shape {self.action.shape} ({', '.join(self.action_names)}), "
-                             f"got {np.shape(action)}") from None
+                             f"got {np.shape(action)}")
+        self.action[:] = action
         bad = self._check()
         if bad >= 0:
             raise InputError(f"action of row {bad} is not finite: {np.asarray(action, float)[bad].tolist()}; "
                              "every value must be a number in [-1, 1]")
-        if self.mode == "targets":
-            self._act()
+        if self._to_targets is not None:
+            self._to_targets()
 
     @property
     def action_names(self) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ import click
 from icing_env.errors import InputError, nearest
 
 VERBS = {
+    "fly": "Fly a scenario and write its record.",
     "effects": "List the ways in which an aircraft may differ from its model.",
     "identify": "Estimate aerodynamic derivatives from flight records.",
 }

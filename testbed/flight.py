@@ -1,0 +1,188 @@
+"""Fly a scenario from start to end and keep what was measured, believed, advised and true.
+
+The record holds measurements and commands only; the truth goes into tables of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icing_env.atmosphere import density
+from icing_env.errors import InputError, nearest
+from icing_env.record import COLUMNS, FlightRecord, Geometry, RecordMeta
+from icing_env.scenario import Scenario
+from icing_env.tasks import REASONS
+from icing_env.types import CURRENT_FIELDS, MEASUREMENT_FIELDS, OUTCOME_FIELDS, SURFACES
+from icing_env.world import World
+from testbed.environments import loop_factory
+
+COMMANDS = ("elevator", "aileron", "rudder")
+SWITCHES = ("boots_wing", "boots_tail", "boots_vtail_struts", "prop_heat")
+RATE = {"(10 Hz)": 0.1, "(1 Hz)": 1.0}  # s between samples of the slow channels
+TRUTH_STATES = ("gust_u", "gust_v", "gust_w", "gust_p", "gust_q", "gust_r", "lwc", "mvd", "temperature", "boot_cycles",
+                *(f"{what}_{surface}" for what in ("eta", "thickness", "ice_mass") for surface in SURFACES))  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Controller:
+    """Who flies: a name, what it is, and what closes the loop."""
+
+    name: str
+    description: str
+    kind: str  # classical, adaptive, learned, oracle
+    steers: bool  # the autopilot flies the task; else the controls stay where the trim put them
+
+
+CONTROLLERS = {
+    "autopilot": Controller("autopilot", "pitch, roll, altitude, speed and heading holds", "classical", True),
+    "hands_off": Controller("hands_off", "controls held at the trim", "classical", False),
+}
+
+
+@dataclass(frozen=True)
+class Flight:
+    """One flight.
+
+    Attributes:
+        record: what was measured and commanded.
+        truth: true values by name [samples]; never shown to an estimator or a controller.
+        estimate, advisory: what the observer believed and the ice management said, by name [samples].
+        reason: why it ended early, "" if it did not.
+    """
+
+    record: FlightRecord
+    truth: dict[str, NDArray[np.float64]]
+    estimate: NDArray[Any]
+    advisory: NDArray[Any]
+    reason: str
+
+
+def controller(name: str) -> Controller:
+    """The controller of that name; InputError names the nearest."""
+    if name not in CONTROLLERS:
+        raise InputError(f"no controller '{name}': {nearest(name, list(CONTROLLERS))}")
+    return CONTROLLERS[name]
+
+
+def make_world(scenario: Scenario, n: int = 1, who: str = "autopilot", protection: bool = True,
+               observer: bool = True, threads: int = 1) -> World:
+    """World in which a controller flies a scenario, with or without ice management and protection."""
+    pilot = controller(who)
+    boots = scenario.ice_protection == "management"
+    loop = loop_factory(observer=observer, management=protection, protection=protection, boots=boots and protection)
+    return World(scenario, n, loop, mode=None if pilot.steers else "surfaces", threads=threads)
+
+
+def fly(scenario: Scenario, who: str = "autopilot", seed: int = 0, *, protection: bool = True, observer: bool = True,
+        rate: float | None = None, progress: Callable[[int], None] | None = None) -> Flight:
+    """Fly one scenario.
+
+    Args:
+        scenario: of `icing_env.scenario.load`.
+        who: name in CONTROLLERS.
+        seed: of everything drawn.
+        protection: ice management and envelope protection on.
+        observer: estimator in the loop.
+        rate: samples kept per second; the step's own (50) if omitted.
+        progress: called with the number of steps flown, now and then.
+
+    Returns:
+        The flight, up to its end or to the step that ended it.
+
+    Raises:
+        InputError: unknown controller, or a rate that does not divide that of the step.
+    """
+    world = make_world(scenario, 1, who, protection, observer)
+    every = _every(rate, world.dt)
+    world.reset(seeds=[seed])
+    if world.mode is not None:
+        world.action[:] = 0.0
+    f = world.fleet
+    sources = {"measurement": f.measurement, "command": f.command, "state": f.state, "current": f.current,
+               "outcome": f.outcome, "estimate": world.loop.estimate, "advisory": world.loop.advisory}
+    kept = {name: np.zeros(world.limit//every + 1, array.dtype) for name, array in sources.items()}
+    count = 0
+    for step in range(world.limit + 1):
+        if step % every == 0:
+            for name, array in sources.items():
+                kept[name][count] = array[0]
+            count += 1
+        if step == world.limit or world.terminated[0]:
+            break
+        world.step()
+        if progress is not None and step % 500 == 0:
+            progress(step)
+    kept = {name: array[:count] for name, array in kept.items()}
+    truth = _truth(kept, world)
+    return Flight(_record(kept, world, seed), truth, kept["estimate"], kept["advisory"],
+                  REASONS[int(world.task["reason"][0])])
+
+
+def _every(rate: float | None, dt: float) -> int:
+    every = 1 if rate is None else round(1.0/(rate*dt))
+    if every < 1 or (rate is not None and abs(every*dt*rate - 1.0) > 1e-9):
+        raise InputError(f"rate must divide {1.0/dt:g} Hz: 50, 25, 10, 5, 2 or 1; got {rate}")
+    return every
+
+
+def _record(kept: dict[str, NDArray[Any]], world: World, seed: int) -> FlightRecord:
+    """Measurements and commands as a flight record; slow channels are blank between their samples."""
+    time = kept["measurement"]["time"].copy()
+    channels = {"time": time}
+    for name, _unit, meaning in MEASUREMENT_FIELDS[1:]:
+        if name in COLUMNS:
+            channels[name] = kept["measurement"][name].astype(np.float64)
+            for mark, period in RATE.items():
+                if mark in meaning:
+                    channels[name][~_sampled(time, period)] = np.nan
+    for surface in COMMANDS:
+        channels[f"{surface}_command"] = kept["command"][surface].astype(np.float64)
+    for switch in SWITCHES:
+        channels[switch] = (kept["command"][switch] > 0.5).astype(np.float64)
+    p, s = world.clean[0], world.scenario
+    meta = RecordMeta(
+        aircraft=s.aircraft, flight=s.name, mass=float(p["mass"]), cg=(0.0, 0.0, 0.0),
+        inertia=tuple(float(p[f"inertia_{a}"]) for a in ("xx", "yy", "zz", "xz")),  # type: ignore[arg-type]
+        notes=f"simulated: scenario {s.name}, seed {seed}", name=s.name,
+        geometry=Geometry(float(p["wing_area"]), float(p["span"]), float(p["chord"])))
+    return FlightRecord(channels=channels, meta=meta)
+
+
+def _sampled(time: NDArray[np.float64], period: float) -> NDArray[np.bool_]:
+    phase = time/period
+    return np.abs(phase - np.round(phase)) < 1e-6
+
+
+def _truth(kept: dict[str, NDArray[Any]], world: World) -> dict[str, NDArray[np.float64]]:
+    """True air data, coefficients, ice and gusts by name."""
+    out = {"time": kept["measurement"]["time"].copy()}
+    out |= {f"true_{name}": kept["outcome"][name].copy() for name, _, _ in OUTCOME_FIELDS}
+    out |= {name: kept["current"][name].copy() for name, _, _ in CURRENT_FIELDS if not name.startswith("per_")}
+    out |= {name: kept["state"][name].copy() for name in TRUTH_STATES}
+    out["density"] = np.array([density(h) for h in kept["state"]["altitude"]])
+    return out | quasi_steady(out, world.true[0])
+
+
+def quasi_steady(truth: dict[str, NDArray[np.float64]], p: Any) -> dict[str, NDArray[np.float64]]:
+    """What a regression without a downwash lag should find: the quasi-steady equivalent derivatives.
+
+    The lag adds Cm_alphadot (c/2V) alpha_dot with alpha_dot = q + (rho S V/2m)(CZ_alpha alpha + CZ_q qhat + ...), so
+    that each moment derivative gains Cm_alphadot (rho S c/4m) times its lift derivative; CL_alpha at alpha = 0 is
+    CX_0 - CZ_alpha. CD_0 is the drag at zero lift. (Etkin & Reid, Dynamics of Flight, 3rd ed., section 5.5.)
+    """
+    lag = p["Cm_alphadot"]*truth["density"]*p["wing_area"]*p["chord"]/(4.0*truth["mass"])
+    alpha0 = truth["CZ_0"]/(truth["CX_0"] - truth["CZ_alpha"])
+    drag = -(truth["CX_0"] + alpha0*(truth["CX_alpha"] + alpha0*truth["CX_alpha2"]))/np.cos(alpha0)
+    return {
+        "quasi_CL_alpha": truth["CX_0"] - truth["CZ_alpha"],
+        "quasi_CL_elevator": -truth["CZ_elevator"],
+        "quasi_CD_0": drag + truth["CD_parasite"],
+        "quasi_Cm_alpha": truth["Cm_alpha"] + lag*truth["CZ_alpha"],
+        "quasi_Cm_q": truth["Cm_q"] + lag*truth["CZ_q"],
+        "quasi_Cm_elevator": truth["Cm_elevator"] + lag*truth["CZ_elevator"],
+    }
