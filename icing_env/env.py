@@ -48,7 +48,8 @@ class TwinOtterEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.world = World(scenarios.load(scenario, **(changes or {})), 1, loop, mode=mode, axes=axes, dt=dt,
                            substeps=substeps)
         self.render_mode = render_mode
-        self.observation_space, self.action_space = box_spaces(self.world)
+        # A Box is declared as a space of any float; ours are of float32.
+        self.observation_space, self.action_space = box_spaces(self.world)  # type: ignore[assignment]
         self._window: Any = None
         names = self.world.task.dtype.names or ()
         first, last = names.index(f"reward_{REWARD_TERMS[0]}"), names.index("reason")
@@ -58,7 +59,7 @@ class TwinOtterEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     @property
     def observation_names(self) -> tuple[str, ...]:
         """Names of the observation's channels, in order."""
-        return tuple(c.name for c in self.world.observer.channels)
+        return tuple(c.name for c in self.world.view.channels)
 
     @property
     def action_names(self) -> tuple[str, ...]:
@@ -84,7 +85,7 @@ class TwinOtterEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self.render_mode == "human":
             self._show()
         numbers = self._numbers.tolist()
-        return (self.world.observer.out[0].copy(), numbers[N_TERMS], numbers[-1] > 0.0,
+        return (self.world.view.out[0].copy(), numbers[N_TERMS], numbers[-1] > 0.0,
                 bool(self.world.steps[0] >= self.world.limit), _info(numbers))
 
     def render(self) -> NDArray[np.uint8] | None:
@@ -124,6 +125,6 @@ def _info(numbers: list[float]) -> dict[str, Any]:
 
 def box_spaces(world: World) -> tuple[spaces.Box, spaces.Box]:
     """Observation and action space of one aircraft of a world."""
-    observer = world.observer
-    return (spaces.Box(observer.low, observer.high, dtype=np.float32),
+    view = world.view
+    return (spaces.Box(view.low, view.high, dtype=np.float32),
             spaces.Box(-1.0, 1.0, (len(world.action_names),), np.float32))

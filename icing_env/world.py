@@ -11,17 +11,39 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from icing_env import actions, aircraft, effects, tasks
+from icing_env import actions, aircraft, effects
 from icing_env.errors import InputError
-from icing_env.jit import bound
+from icing_env.jit import bound, entry
 from icing_env.loop import LoopFactory, NoLoop
 from icing_env.manoeuvres import excite, schedule
-from icing_env.observation import Axes, Observer, gather
+from icing_env.observation import Axes, Observation, gather
 from icing_env.scenario import Range, Scenario
 from icing_env.simulate import Fleet
-from icing_env.tasks import TASK, TASKS, judge_rows, refer_rows
+from icing_env.tasks import TASK, TASKS, judge, measure_errors, refer, refer_rows
 from icing_env.trim import conditions, trim_rows
 from icing_env.types import COMMAND, SURFACES
+
+
+@entry
+def conclude(task: Any, target: Any, weights: Any, measurement: Any, state: Any, outcome: Any, current: Any,
+             command: Any, parameters: Any, steps: Any, seen: Any, tasks: Any, estimates: Any, advice: Any,
+             bounds: Any, index: Any, gain: Any, low: Any, high: Any, out: Any) -> None:
+    """After a step, for every row: its count, references, errors, rewards, ending, observation."""
+    shared = len(parameters) == 1
+    for i in range(len(task)):
+        steps[i] += 1
+        refer(task[i], target[i], measurement[i].time)
+        measure_errors(task[i], target[i], measurement[i])
+        judge(task[i], weights[0], state[i], outcome[i], current[i], command[i], parameters[0 if shared else i])
+        gather(i, seen, tasks, estimates, advice, bounds, index, gain, low, high, out)
+
+
+@entry
+def look(seen: Any, tasks: Any, estimates: Any, advice: Any, bounds: Any, index: Any, gain: Any, low: Any, high: Any,
+         out: Any) -> None:
+    """Observation of every row."""
+    for i in range(out.shape[0]):
+        gather(i, seen, tasks, estimates, advice, bounds, index, gain, low, high, out)
 
 
 class World:
@@ -53,20 +75,21 @@ class World:
         self.limit = round(scenario.duration/dt)
         self.doublets = schedule(scenario.doublets())
         self.clean_estimate = self.loop.estimate[:1].copy()
-        self.observer = Observer(axes, n, TASK, self.clean_estimate)
+        self.view = Observation(axes, n, TASK, self.clean_estimate)
         self.action = np.zeros((n, len(actions.names(mode, axes)) if mode else 0))
         self.scheduled = bool(scenario.cloud or scenario.events)
+        self._shape = self.action.shape
         self._bind(mode, axes)
 
     def _bind(self, mode: actions.Mode | None, axes: Axes) -> None:
         f, loop = self.fleet, self.loop
-        rows = [a.view(np.float64).reshape(self.n, -1) for a in (f.measurement, self.task, loop.estimate)]
-        advisory = loop.advisory.view(np.float64).reshape(self.n, -1)
-        self._views = (*rows, advisory)
-        o = self.observer
-        self._gather = bound(gather, *self._views, o.source, o.index, o.gain, o.low, o.high, o.out)
-        self._judge = bound(judge_rows, self.task, loop.target, self.weights, f.measurement, f.state, f.outcome,
-                            f.current, f.command, f.parameters, self.steps)
+        views = [a.view(np.float64).reshape(self.n, -1)
+                 for a in (f.measurement, self.task, loop.estimate, loop.advisory)]
+        v = self.view
+        layout = (*views, v.bounds, v.index, v.gain, v.low, v.high, v.out)
+        self._conclude = bound(conclude, self.task, loop.target, self.weights, f.measurement, f.state, f.outcome,
+                               f.current, f.command, f.parameters, self.steps, *layout)
+        self._look = bound(look, *layout)
         self._excite = bound(excite, f.command, f.measurement, self.doublets) if len(self.doublets) else None
         self._check = bound(actions.first_bad_row, self.action, -1.0, 1.0)
         columns = actions.columns(mode, axes) if mode else None
@@ -148,7 +171,7 @@ class World:
         target = self.loop.target[rows]
         refer_rows(k, target, f.measurement[rows])
         self.task[rows], self.loop.target[rows] = k, target
-        self._gather()
+        self._look()
 
     def _settings(self, k: NDArray) -> None:
         """Numbers of the task that do not change within an episode."""
@@ -195,12 +218,11 @@ class World:
         if self.scheduled and self.steps[0] % self.fleet.clocks[1] == 0:
             self._follow_schedule(np.arange(self.n))
         self._observe()
-        self._judge()
-        self._gather()
+        self._conclude()
 
     def _take(self, action: NDArray) -> None:
         """Check and store the action; targets reach the autopilot at once."""
-        if np.shape(action) != self.action.shape:
+        if getattr(action, "shape", None) != self._shape:
             raise InputError(f"action must have shape {self.action.shape} ({', '.join(self.action_names)}), "
                              f"got {np.shape(action)}")
         self.action[:] = action
@@ -219,7 +241,7 @@ class World:
     @property
     def observation(self) -> NDArray[np.float32]:
         """Observations [n, channels]; the array is written anew in each step."""
-        return self.observer.out
+        return self.view.out
 
     def frame(self, row: int) -> NDArray[np.uint8]:
         """Primary flight display of one aircraft, [height, width, 3]; what its instruments and advisers say."""
@@ -246,7 +268,7 @@ class World:
         f = self.fleet
         return {"state": f.state, "measurement": f.measurement, "current": f.current, "command": f.command,
                 "outcome": f.outcome, "parameters": f.parameters, "task": self.task, "trimmed": self.trimmed,
-                "seed": self.seed, "episode": self.episode, "steps": self.steps, "observation": self.observer.out,
+                "seed": self.seed, "episode": self.episode, "steps": self.steps, "observation": self.view.out,
                 **{f"loop_{name}": array for name, array in self.loop.memory().items()}}
 
     def save(self) -> dict[str, NDArray]:
@@ -261,7 +283,8 @@ class World:
         """
         for name, array in self._arrays().items():
             if name not in saved or saved[name].shape != array.shape or saved[name].dtype != array.dtype:
-                raise InputError(f"saved state does not fit: '{name}' must be {array.dtype.name} of shape {array.shape}")
+                must = f"{array.dtype.name} of shape {array.shape}"
+                raise InputError(f"saved state does not fit: '{name}' must be {must}")
         for name, array in self._arrays().items():
             array[...] = saved[name]
 
