@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from icing_env.jit import entry
+from icing_env.jit import kernel
 from icing_env.types import ADVISORY, ESTIMATE, MEASUREMENT
 
 Source = Literal["measurement", "task", "estimate", "advisory"]
@@ -85,8 +85,8 @@ def channels(axes: Axes) -> tuple[Channel, ...]:
     return tuple(c for c in CHANNELS if axes == "all" or c.axes in ("all", axes))
 
 
-class Observer:
-    """Gathers observations of `n` aircraft into one float32 array [n, channels].
+class Observation:
+    """Layout of the observations of `n` aircraft, and their memory `out` [n, channels] (float32).
 
     `reference`: ESTIMATE row of the clean aircraft, by which estimates are divided.
     """
@@ -95,7 +95,7 @@ class Observer:
         self.channels = channels(axes)
         names = {"measurement": MEASUREMENT.names, "task": task_dtype.names, "estimate": ESTIMATE.names,
                  "advisory": ADVISORY.names}
-        self.source = np.array([SOURCES.index(c.source) for c in self.channels])
+        self.bounds = np.cumsum([0, *(sum(c.source == s for c in self.channels) for s in SOURCES)])
         self.index = np.array([(names[c.source] or ()).index(c.name) for c in self.channels])
         self.low = np.array([c.low for c in self.channels], np.float32)
         self.high = np.array([c.high for c in self.channels], np.float32)
@@ -104,26 +104,20 @@ class Observer:
             for c in self.channels])
         self.out = np.zeros((n, len(self.channels)), np.float32)
 
-    def gather(self, measurement: NDArray, task: NDArray, estimate: NDArray, advisory: NDArray) -> NDArray:
-        """Fill and return the observation array; arguments are float64 views [n, fields] of the structured arrays."""
-        gather(measurement, task, estimate, advisory, self.source, self.index, self.gain, self.low, self.high, self.out)
-        return self.out
+
+@kernel
+def gather(i: int, measurement: Any, task: Any, estimate: Any, advisory: Any, bounds: Any, index: Any, gain: Any,
+           low: Any, high: Any, out: Any) -> None:
+    """Observation of row `i`; sources are float64 views [n, fields], channels lie source by source within `bounds`."""
+    pick(i, measurement, bounds[0], bounds[1], index, gain, low, high, out)
+    pick(i, task, bounds[1], bounds[2], index, gain, low, high, out)
+    pick(i, estimate, bounds[2], bounds[3], index, gain, low, high, out)
+    pick(i, advisory, bounds[3], bounds[4], index, gain, low, high, out)
 
 
-@entry
-def gather(measurement: Any, task: Any, estimate: Any, advisory: Any, source: Any, index: Any, gain: Any, low: Any,
-           high: Any, out: Any) -> None:
-    """Copy, scale and clip every channel of every row; a value that is no number becomes the lower bound."""
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
-            k = index[j]
-            if source[j] == 0:
-                value = measurement[i, k]
-            elif source[j] == 1:
-                value = task[i, k]
-            elif source[j] == 2:
-                value = estimate[i, k]
-            else:
-                value = advisory[i, k]
-            value = np.float32(value*gain[j])
-            out[i, j] = min(max(value, low[j]), high[j]) if value == value else low[j]
+@kernel
+def pick(i: int, source: Any, first: int, last: int, index: Any, gain: Any, low: Any, high: Any, out: Any) -> None:
+    """Copy, scale and clip the channels of one source; a value that is no number becomes the lower bound."""
+    for j in range(first, last):
+        value = np.float32(source[i, index[j]]*gain[j])
+        out[i, j] = min(max(value, low[j]), high[j]) if value == value else low[j]

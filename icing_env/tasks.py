@@ -86,9 +86,9 @@ def refer(k: Any, g: Any, time: float) -> None:
 @kernel
 def climb_rate(m: Any) -> float:
     """Rate of climb [m/s] in the air mass from measured airspeed, flow angles and attitude."""
-    forward = math.cos(m.alpha)*math.cos(m.beta)*math.sin(m.theta)
-    side = math.sin(m.beta)*math.sin(m.phi) + math.sin(m.alpha)*math.cos(m.beta)*math.cos(m.phi)
-    return m.airspeed*(forward - side*math.cos(m.theta))
+    sa, sb, st = math.sin(m.alpha), math.sin(m.beta), math.sin(m.theta)
+    ca, cb, ct = math.sqrt(1.0 - sa*sa), math.sqrt(1.0 - sb*sb), math.sqrt(1.0 - st*st)  # all within 90 deg
+    return m.airspeed*(ca*cb*st - ct*(sb*math.sin(m.phi) + sa*cb*math.cos(m.phi)))
 
 
 @kernel
@@ -141,15 +141,3 @@ def refer_rows(task: Any, target: Any, measurement: Any) -> None:
     for i in range(len(task)):
         refer(task[i], target[i], measurement[i].time)
         measure_errors(task[i], target[i], measurement[i])
-
-
-@entry
-def judge_rows(task: Any, target: Any, weights: Any, measurement: Any, state: Any, outcome: Any, current: Any,
-               command: Any, parameters: Any, steps: Any) -> None:
-    """After a step: its count, references, errors, rewards and endings of every row."""
-    shared = len(parameters) == 1
-    for i in range(len(task)):
-        steps[i] += 1
-        refer(task[i], target[i], measurement[i].time)
-        measure_errors(task[i], target[i], measurement[i])
-        judge(task[i], weights[0], state[i], outcome[i], current[i], command[i], parameters[0 if shared else i])

@@ -172,17 +172,20 @@ def quasi_steady(truth: dict[str, NDArray[np.float64]], p: Any) -> dict[str, NDA
     """What a regression without a downwash lag should find: the quasi-steady equivalent derivatives.
 
     The lag adds Cm_alphadot (c/2V) alpha_dot with alpha_dot = q + (rho S V/2m)(CZ_alpha alpha + CZ_q qhat + ...), so
-    that each moment derivative gains Cm_alphadot (rho S c/4m) times its lift derivative; CL_alpha at alpha = 0 is
-    CX_0 - CZ_alpha. CD_0 is the drag at zero lift. (Etkin & Reid, Dynamics of Flight, 3rd ed., section 5.5.)
+    that each moment derivative gains Cm_alphadot (rho S c/4m) times its lift derivative; the lag's next term goes with
+    alpha_ddot, nearly q_dot, and divides them by 1 + M_alphadot l_t/V = 1 + Cm_alphadot rho S c^2 l_t/(4 Iyy).
+    CL_alpha at alpha = 0 is CX_0 - CZ_alpha. CD_0 is the drag at zero lift. (Etkin & Reid, Dynamics of Flight, 3rd ed.,
+    section 5.5.)
     """
     lag = p["Cm_alphadot"]*truth["density"]*p["wing_area"]*p["chord"]/(4.0*truth["mass"])
+    inertia = 1.0 + p["Cm_alphadot"]*truth["density"]*p["wing_area"]*p["chord"]**2*p["tail_arm"]/(4.0*p["inertia_yy"])
     alpha0 = truth["CZ_0"]/(truth["CX_0"] - truth["CZ_alpha"])
     drag = -(truth["CX_0"] + alpha0*(truth["CX_alpha"] + alpha0*truth["CX_alpha2"]))/np.cos(alpha0)
     return {
         "quasi_CL_alpha": truth["CX_0"] - truth["CZ_alpha"],
         "quasi_CL_elevator": -truth["CZ_elevator"],
         "quasi_CD_0": drag + truth["CD_parasite"],
-        "quasi_Cm_alpha": truth["Cm_alpha"] + lag*truth["CZ_alpha"],
-        "quasi_Cm_q": truth["Cm_q"] + lag*truth["CZ_q"],
-        "quasi_Cm_elevator": truth["Cm_elevator"] + lag*truth["CZ_elevator"],
+        "quasi_Cm_alpha": (truth["Cm_alpha"] + lag*truth["CZ_alpha"])/inertia,
+        "quasi_Cm_q": (truth["Cm_q"] + lag*truth["CZ_q"])/inertia,
+        "quasi_Cm_elevator": (truth["Cm_elevator"] + lag*truth["CZ_elevator"])/inertia,
     }
