@@ -14,6 +14,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from icing_env.jit import kernel
 from icing_env.random import STREAM_SHEDDING, uniform4
 from icing_env.stagnation import FREEZING, catch, freezing_fraction, viscosity_of_air
@@ -196,3 +199,23 @@ def advance_accretion(s: Any, p: Any, airspeed: float, density: float, dt: float
     grow_wing(s, p, airspeed, density, dt)
     grow_tail(s, p, airspeed, density, dt)
     grow_others(s, p, airspeed, density, dt)
+
+
+GLAZE = 0.37  # freezing fraction on the wing in the first encounter of flight 010302f1 (docs/model_weather_ice.md)
+
+
+def glaze_of(eta: NDArray, p: NDArray, surface: str) -> tuple[NDArray, NDArray]:
+    """Thickness (m) and mass (kg) of the glaze that makes a severity, for a flight that starts with ice on.
+
+    `growth` and `add_severity` turned round, at the freezing fraction GLAZE.
+
+    Args:
+        eta: severity [n]; as good as saturated where it is beyond the saturation.
+        p: PARAMETERS [n or 1].
+        surface: name in SURFACES.
+    """
+    saturation = p[f"eta_saturation_{surface}"]
+    gain = -saturation*np.log1p(-np.minimum(eta/saturation, 0.99))
+    depth = gain*p[f"eta_length_{surface}"]/(p["eta_rate"]*np.array([
+        glaze(GLAZE, peak, rime) for peak, rime in zip(p["glaze_peak"], p["rime_severity"], strict=True)]))
+    return depth*GLAZE, depth*p["ice_density"]*p[f"frontal_area_{surface}"]*0.5*(1.0 + GLAZE)

@@ -81,7 +81,9 @@ class Event(Strict):
     """Ice protection switched, or a set of doublets flown, at a time."""
 
     time: float  # s
+    name: str = ""  # by which a result can refer to it
     boots: tuple[Literal["wing", "tail", "vtail_struts"], ...] = ()  # one shot each
+    prop_heat: bool | None = None  # switched on or off from here
     doublets: bool = False
     note: str = ""
 
@@ -113,6 +115,7 @@ class Scenario(Strict):
     cloud: tuple[CloudPoint, ...] = ()
     events: tuple[Event, ...] = ()
     doublets_at: tuple[float, ...] = ()  # s, starts of doublet sets
+    doublet_scale: float = Limited(1.0, gt=0.0, le=3.0)  # 1: 0.25 g at 72 m/s
     randomise: Randomise = Randomise()
 
     def clean_parameters(self) -> NDArray:
@@ -132,7 +135,7 @@ class Scenario(Strict):
         starts = [*self.doublets_at, *(e.time for e in self.events if e.doublets)]
         if self.task.kind == "doublets" and not starts:
             starts = [10.0, 60.0]
-        return tuple(d for start in starts for d in doublet_set(start))
+        return tuple(d for start in starts for d in doublet_set(start, scale=self.doublet_scale))
 
     def weights(self) -> NDArray:
         """Reward weights, one row."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icing_env import actions, aircraft, effects
+from icing_env.accretion import glaze_of
 from icing_env.errors import InputError
 from icing_env.jit import bound, entry
 from icing_env.loop import LoopFactory, NoLoop
@@ -147,7 +148,9 @@ class World:
         state, command, current = np.zeros_like(f.state[rows]), np.zeros_like(f.command[rows]), f.current[rows]
         parameters = f.parameters if len(f.parameters) == 1 else f.parameters[rows]
         for k, surface in enumerate(SURFACES):
-            state[f"eta_{surface}"] = eta[:, k]
+            thickness, mass = glaze_of(eta[:, k], parameters, surface)
+            state[f"eta_{surface}"], state[f"thickness_{surface}"] = eta[:, k], thickness
+            state[f"ice_mass_{surface}"] = mass
         left_over = trim_rows(state, current, command, condition, parameters)
         if not np.all(np.isfinite(left_over)):
             raise InputError(f"scenario '{self.scenario.name}': no steady flight at the start: less ice or more speed")
@@ -184,17 +187,17 @@ class World:
     def _follow_schedule(self, rows: NDArray) -> None:
         """Prescribed cloud and scheduled ice protection for the time it is in each of `rows`."""
         cloud, events, f = self.scenario.cloud, self.scenario.events, self.fleet
-        if not cloud and not events:
-            return
-        for i in rows:
-            now = self.steps[i]*self.dt
-            for point in cloud:
-                if point.time <= now + 1e-9:
-                    f.state["lwc"][i], f.state["mvd"][i] = point.lwc, point.mvd
-                    f.state["temperature"][i] = point.temperature
-            for event in events:
-                for boot in event.boots:
-                    f.command[f"boots_{boot}"][i] = float(0.0 <= now - event.time + 1e-9 < 1.0)
+        for count in np.unique(self.steps[rows]) if cloud or events else ():
+            now, due = count*self.dt + 1e-9, rows[self.steps[rows] == count]
+            for point in [p for p in cloud if p.time <= now][-1:]:
+                f.state["lwc"][due], f.state["mvd"][due] = point.lwc, point.mvd
+                f.state["temperature"][due] = point.temperature
+            if events:
+                shots = {boot for e in events if 0.0 <= now - e.time < 1.0 for boot in e.boots}
+                for boot in ("wing", "tail", "vtail_struts"):
+                    f.command[f"boots_{boot}"][due] = float(boot in shots)
+            for event in [e for e in events if e.prop_heat is not None and e.time <= now][-1:]:
+                f.command["prop_heat"][due] = float(bool(event.prop_heat))
 
     def step(self, action: NDArray | None = None) -> None:
         """One step of every aircraft.
