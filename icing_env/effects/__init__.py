@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
 from numpy.typing import NDArray
 
 from icing_env.effects import (
@@ -143,15 +144,19 @@ def with_effects(parameters: NDArray, effects: Mapping[str, Mapping[str, float |
         effects: values by parameter, by effect; a parameter left out stays neutral.
 
     Raises:
-        InputError: unknown effect or parameter, or a value that is no finite number.
+        InputError: unknown effect or parameter, a value that is no finite number, or not one per aircraft.
     """
     out = parameters.copy()
     for name, values in effects.items():
         effect = get(name)
         valid = [p.name for p in effect.parameters]
-        for key in values:
+        for key, value in values.items():
             if key not in valid:
                 raise InputError(f"effect '{name}' has no parameter '{key}': {nearest(key, valid)}")
+            if not np.isfinite(value).all():
+                raise InputError(f"effect '{name}': {key} is {value}: expected a finite number")
+            if np.size(value) not in (1, len(out)):
+                raise InputError(f"effect '{name}': {np.size(value)} values of {key} for {len(out)} aircraft")
         effect.apply(out, {**effect.neutral(), **values})
     return out
 
