@@ -25,7 +25,7 @@ COMMANDS = ("elevator", "aileron", "rudder")
 SWITCHES = ("boots_wing", "boots_tail", "boots_vtail_struts", "prop_heat")
 RATE = {"(10 Hz)": 0.1, "(1 Hz)": 1.0}  # s between samples of the slow channels
 TRUTH_STATES = ("gust_u", "gust_v", "gust_w", "gust_p", "gust_q", "gust_r", "lwc", "mvd", "temperature", "boot_cycles",
-                *(f"{what}_{surface}" for what in ("eta", "thickness", "ice_mass") for surface in SURFACES))  # fmt: skip
+                *(f"{what}_{surface}" for what in ("eta", "thickness", "ice_mass") for surface in SURFACES))
 
 
 @dataclass(frozen=True)

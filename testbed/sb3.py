@@ -30,7 +30,7 @@ class TwinOtterVecEnv(VecEnv):
 
     def reset(self) -> NDArray[np.float32]:
         """Begin new episodes everywhere; the seeds of `seed()` are used once."""
-        seeds = [s for s in self._seeds if s is not None]
+        seeds: list[int | None] = [s for s in self._seeds if s is not None]
         observation, _ = self.batch.reset(seed=seeds if len(seeds) == self.num_envs else None)
         self.reset_infos = [{} for _ in range(self.num_envs)]
         self._reset_seeds()

@@ -31,7 +31,8 @@ SECONDS = 0.04  # of a chunk
 JSBSIM_WRITES = ("fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/rudder-cmd-norm", "fcs/throttle-cmd-norm")
 JSBSIM_READS = (
     "velocities/vt-fps", "aero/alpha-rad", "aero/beta-rad", "velocities/p-rad_sec", "velocities/q-rad_sec",
-    "velocities/r-rad_sec", "attitude/phi-rad", "attitude/theta-rad", "attitude/psi-rad", "accelerations/n-pilot-x-norm",
+    "velocities/r-rad_sec", "attitude/phi-rad", "attitude/theta-rad", "attitude/psi-rad",
+    "accelerations/n-pilot-x-norm",
     "accelerations/n-pilot-y-norm", "accelerations/n-pilot-z-norm", "position/h-sl-ft",
     "propulsion/engine/thrust-lbs", "aero/qbar-psf",
 )  # fmt: skip

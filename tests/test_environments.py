@@ -47,7 +47,7 @@ def test_gymnasium_accepts_every_id_and_option(name: str, options: dict[str, Any
 @pytest.mark.parametrize("name", IDS)
 @pytest.mark.parametrize("options", OPTIONS, ids=str)
 def test_stable_baselines_accepts_every_id_and_option(name: str, options: dict[str, Any]) -> None:
-    checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="the extra `learning` is not installed")
+    checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="the extra `learning` is absent")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         checker.check_env(gym.make(name, **options).unwrapped)

@@ -30,5 +30,6 @@ def command(name: str, as_json: bool, seed: int) -> None:
         rows += [[f"{label} of {n}", f"{rate:,.0f} steps/s"] for n, rate in figures[key].items()]
     peer = figures["peers"]["jsbsim_gym_like_step_us"]
     rows.append(["JSBSim, 4 writes, 2 runs, 15 reads", "not installed" if peer is None else f"{peer:.2f} us"])
-    rows += [[key.replace("_", " "), "-" if value is None else f"{value:.1f}"] for key, value in figures["ratios"].items()]
+    rows += [[key.replace("_", " "), "-" if ratio is None else f"{ratio:.1f}"]
+             for key, ratio in figures["ratios"].items()]
     print_table(f"speed on one thread, {figures['machine']}", {"figure": "left", "value": "right"}, rows)
