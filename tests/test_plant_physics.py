@@ -19,7 +19,6 @@ from icing_env.types import COMMAND, SURFACES
 
 AIRCRAFT = load()
 FLAP = float(AIRCRAFT["flap_max"][0])
-FIXED = ("north", "east", "altitude")
 
 
 def attitude(s: NDArray) -> Rotation:
