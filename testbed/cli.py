@@ -19,6 +19,7 @@ from icing_env.errors import InputError, nearest
 VERBS = {
     "fly": "Fly a scenario and write its record.",
     "effects": "List the ways in which an aircraft may differ from its model.",
+    "compare": "Fly controllers with and without protection on the same cases.",
     "benchmark": "Measure how fast the testbed is.",
     "identify": "Estimate aerodynamic derivatives from flight records.",
 }
