@@ -82,7 +82,7 @@ def trace(world: World, seeds: list[int]) -> Trace:
 
 
 def _ice(values: dict[str, FloatArray], world: World) -> dict[str, FloatArray]:
-    """Excess drag, shares of lift slope, elevator power and thrust lost, ice mass and margin to the onset of separation [samples, n]."""
+    """Excess drag, shares of lift slope, elevator power and thrust lost, margin to stall, ice mass [samples, n]."""
     clean, true = world.clean[0], world.fleet.parameters
     truth = {name: values[name] for name in COEFFICIENTS} | {"density": np.ones_like(values["mass"])}
     now = quasi_steady(truth, clean)
