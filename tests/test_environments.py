@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -14,6 +15,7 @@ from gymnasium.vector import AutoresetMode
 import icing_env  # noqa: F401  registers the ids
 from icing_env import scenario as scenarios
 from icing_env.errors import InputError
+from icing_env.observation import CHANNELS
 from icing_env.registration import IDS
 from icing_env.tasks import TASKS
 
@@ -268,3 +270,10 @@ def test_the_window_draws_without_a_screen(monkeypatch: pytest.MonkeyPatch) -> N
     env.reset(seed=1)
     env.step(np.zeros(4, np.float32))
     env.close()
+
+
+def test_the_card_lists_every_channel_with_unit_and_bounds() -> None:
+    text = (Path(__file__).parent.parent / "docs" / "environments.md").read_text()
+    for i, c in enumerate(CHANNELS):
+        assert f"| {i} | `{c.name}` | {c.unit} | {c.low:.4g} | {c.high:.4g} |" in text, c.name
+    assert all(name in text for name in IDS) and all(f"| {task} |" in text for task in TASKS)
