@@ -5,7 +5,7 @@ The record holds measurements and commands only; the truth goes into tables of i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,7 +79,8 @@ def make_world(scenario: Scenario, n: int = 1, who: str = "autopilot", protectio
 
 
 def fly(scenario: Scenario, who: str = "autopilot", seed: int = 0, *, protection: bool = True, observer: bool = True,
-        rate: float | None = None, progress: Callable[[int], None] | None = None) -> Flight:
+        rate: float | None = None, windows: Sequence[tuple[float, float]] | None = None,
+        progress: Callable[[int], None] | None = None) -> Flight:
     """Fly one scenario.
 
     Args:
@@ -89,6 +90,7 @@ def fly(scenario: Scenario, who: str = "autopilot", seed: int = 0, *, protection
         protection: ice management and envelope protection on.
         observer: estimator in the loop.
         rate: samples kept per second; the step's own (50) if omitted.
+        windows: (start, end) [s] of the samples kept; all if omitted. A long flight fits in memory that way.
         progress: called with the number of steps flown, now and then.
 
     Returns:
@@ -98,17 +100,17 @@ def fly(scenario: Scenario, who: str = "autopilot", seed: int = 0, *, protection
         InputError: unknown controller, or a rate that does not divide that of the step.
     """
     world = make_world(scenario, 1, who, protection, observer)
-    every = _every(rate, world.dt)
+    keep = _samples(world, rate, windows)
     world.reset(seeds=[seed])
     if world.mode is not None:
         world.action[:] = 0.0
     f = world.fleet
     sources = {"measurement": f.measurement, "command": f.command, "state": f.state, "current": f.current,
                "outcome": f.outcome, "estimate": world.loop.estimate, "advisory": world.loop.advisory}
-    kept = {name: np.zeros(world.limit//every + 1, array.dtype) for name, array in sources.items()}
+    kept = {name: np.zeros(int(keep.sum()), array.dtype) for name, array in sources.items()}
     count = 0
     for step in range(world.limit + 1):
-        if step % every == 0:
+        if keep[step]:
             for name, array in sources.items():
                 kept[name][count] = array[0]
             count += 1
@@ -121,6 +123,15 @@ def fly(scenario: Scenario, who: str = "autopilot", seed: int = 0, *, protection
     truth = _truth(kept, world)
     return Flight(_record(kept, world, seed), truth, kept["estimate"], kept["advisory"],
                   REASONS[int(world.task["reason"][0])])
+
+
+def _samples(world: World, rate: float | None, windows: Sequence[tuple[float, float]] | None) -> NDArray[np.bool_]:
+    """Which steps of a flight are kept."""
+    steps = np.arange(world.limit + 1)
+    keep = steps % _every(rate, world.dt) == 0
+    if windows is not None:
+        keep &= np.any([(steps*world.dt >= start) & (steps*world.dt <= end) for start, end in windows], axis=0)
+    return keep
 
 
 def _every(rate: float | None, dt: float) -> int:
