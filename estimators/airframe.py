@@ -21,11 +21,15 @@ AIRFRAME_FIELDS: list[Field] = [
     ("inertia_zz", "kg m2", "about body z"),
     ("inertia_xz", "kg m2", "+ integral of x z dm"),
     *((name, "1" if name.endswith("_0") else "1/rad", "clean aircraft") for name in DERIVATIVE_NAMES),
+    ("CL_flap", "1/rad", "lift of flap"),
+    ("CD_flap", "1/rad", "parasite drag of flap"),
+    ("Cm_flap", "1/rad", "moment of flap"),
+    ("induced_drag", "1", "K of CD = CD_0 + K CL^2, for the drag of flap lift"),
     ("vane_lag", "s", "known time constant of the flow vanes, for which they are corrected; 0 where it is not stated"),
     ("boom_gain", "rad s2/m", "known bending of the boom: error of alpha per normal acceleration; as above"),
 ]
 AIRFRAME = structured(AIRFRAME_FIELDS)
-CORRECTIONS = ("vane_lag", "boom_gain")  # of the instruments: none where they are not stated, as in flight records
+OPTIONAL = ("CL_flap", "CD_flap", "Cm_flap", "induced_drag", "vane_lag", "boom_gain")  # 0 where they are not stated
 
 
 def published_airframe(aircraft: str | Path = "twin_otter") -> np.ndarray:
@@ -44,7 +48,7 @@ def airframe_from(parameters: np.ndarray | Mapping[str, float]) -> np.ndarray:
         rows, present = parameters.size, parameters.dtype.names or ()
     else:
         rows, present = 1, tuple(parameters)
-    missing = [name for name in names if name not in (*present, *CORRECTIONS)]
+    missing = [name for name in names if name not in (*present, *OPTIONAL)]
     if missing:
         raise InputError(f"airframe: field '{missing[0]}' is missing; needed: {', '.join(names)}")
     airframe = np.zeros(rows, AIRFRAME)

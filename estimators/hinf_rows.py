@@ -57,6 +57,14 @@ def incidence(m: Any, lag: float, bending: float, dt: float) -> tuple[float, flo
 
 
 @kernel
+def flap_forces(flap: float, alpha: float, af: Any) -> tuple[float, float]:
+    """Lift and drag coefficient that a flap angle adds to the clean aircraft (docs/model.md): known, not estimated."""
+    lift = af["CL_flap"] * flap
+    wing = -(af["CZ_0"] + af["CZ_alpha"] * alpha)
+    return lift, af["CD_flap"] * flap + af["induced_drag"] * lift * (lift + 2.0 * wing)
+
+
+@kernel
 def force_rows(ob: Any, m: Any, af: Any, dt: float) -> float:
     """Drag, lift and side force: states airspeed, alpha, beta; accelerometers x, z, y.
 
@@ -64,6 +72,7 @@ def force_rows(ob: Any, m: Any, af: Any, dt: float) -> float:
     clean shape along body x, so that CD_0 is the drag at zero lift with thrust removed.
     Lift:  k CL = (a_x - T/m) sin alpha - a_z cos alpha.
     CL = CL_0 + CL_alpha alpha + CL_q q^ + CL_elevator elevator.
+    The flap's clean lift, drag and moment are taken out as known.
     Side:  a_y = k (CY_0 + CY_beta beta + CY_p p^ + CY_r r^ + CY_rudder rudder).
     """
     row, rest = ob["row"], ob["rest"]
@@ -76,7 +85,8 @@ def force_rows(ob: Any, m: Any, af: Any, dt: float) -> float:
     thrust = (m["thrust_left"] + m["thrust_right"]) / af["mass"]
     half_span, half_chord = 0.5 * af["span"] / v, 0.5 * af["chord"] / v
 
-    cx = af["CX_0"] + alpha * (af["CX_alpha"] + alpha * af["CX_alpha2"])
+    flap_lift, flap_drag = flap_forces(m["flap"], alpha, af)
+    cx = af["CX_0"] + alpha * (af["CX_alpha"] + alpha * af["CX_alpha2"]) + flap_lift * sa - flap_drag * ca
     known = k * (cx + clean_zero_lift_drag(af) * ca) + thrust
     row[0] = -k * ca * ca * cb
     rest[0] = (
@@ -87,7 +97,9 @@ def force_rows(ob: Any, m: Any, af: Any, dt: float) -> float:
     lift = -k / (v * cb)
     row[1], row[2], row[3], row[4] = lift, lift * alpha, lift * half_chord * q, lift * m["elevator"]
     rest[1] = q - sb / cb * (p * ca + r * sa) + (GRAVITY * (sa * st + ca * cp * ct) - thrust * sa) / (v * cb)
-    ob["felt"][1], ob["factor"][1] = (m["az"] * ca - (m["ax"] - thrust) * sa) / (v * cb), v * cb
+    rest[1] += lift * flap_lift
+    ob["felt"][1] = (m["az"] * ca - (m["ax"] - thrust) * sa) / (v * cb) - lift * flap_lift
+    ob["factor"][1] = v * cb
 
     side = k * cb / v
     row[9], row[10], row[11] = side, side * beta, side * half_span * p
@@ -121,7 +133,7 @@ def moment_rows(ob: Any, m: Any, af: Any, qbar: float) -> None:
     pitch = force * af["chord"] / yy
     row[5], row[6] = pitch, pitch * alpha
     row[7], row[8] = pitch * 0.5 * af["chord"] / v * q, pitch * m["elevator"]
-    rest[2] = ((zz - xx) * p * r + xz * (r * r - p * p)) / yy
+    rest[2] = ((zz - xx) * p * r + xz * (r * r - p * p)) / yy + pitch * af["Cm_flap"] * m["flap"]
     for channel, inertia in ((14, xx), (20, zz)):
         moment = force * af["span"] / inertia
         row[channel], row[channel + 1] = moment, moment * beta
@@ -138,6 +150,6 @@ def readable(m: Any) -> bool:
     total = (
         m["alpha"] + m["beta"] + m["p"] + m["q"] + m["r"] + m["phi"] + m["theta"] + m["ax"] + m["ay"] + m["az"]
         + m["elevator"] + m["aileron"] + m["rudder"] + m["thrust_left"] + m["thrust_right"]
-        + m["airspeed"] + m["pressure"] + m["temperature"]
+        + m["airspeed"] + m["pressure"] + m["temperature"] + m["flap"]
     )  # fmt: skip
     return math.isfinite(total) and m["airspeed"] > 5.0 and m["pressure"] > 0.0 and m["temperature"] > 0.0

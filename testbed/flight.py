@@ -176,7 +176,16 @@ def _truth(kept: dict[str, NDArray[Any]], world: World) -> dict[str, NDArray[np.
     out |= {name: kept["current"][name].copy() for name, _, _ in CURRENT_FIELDS if not name.startswith("per_")}
     out |= {name: kept["state"][name].copy() for name in TRUTH_STATES}
     out["density"] = np.array([density(h) for h in kept["state"]["altitude"]])
-    return out | quasi_steady(out, world.true[0])
+    out |= quasi_steady(out, world.true[0])
+    clean = world.clean[0]
+    out["excess_CD_0"] = out["quasi_CD_0"] - zero_lift_drag(clean) - clean["CD_parasite"]
+    return out
+
+
+def zero_lift_drag(c: Any) -> Any:
+    """Drag coefficient at zero lift of the body-axis set (arrays or numbers by name)."""
+    alpha = c["CZ_0"]/(c["CX_0"] - c["CZ_alpha"])
+    return -(c["CX_0"] + alpha*(c["CX_alpha"] + alpha*c["CX_alpha2"]))/np.cos(alpha)
 
 
 def quasi_steady(truth: dict[str, NDArray[np.float64]], p: Any) -> dict[str, NDArray[np.float64]]:
@@ -190,12 +199,11 @@ def quasi_steady(truth: dict[str, NDArray[np.float64]], p: Any) -> dict[str, NDA
     """
     lag = p["Cm_alphadot"]*truth["density"]*p["wing_area"]*p["chord"]/(4.0*truth["mass"])
     inertia = 1.0 + p["Cm_alphadot"]*truth["density"]*p["wing_area"]*p["chord"]**2*p["tail_arm"]/(4.0*p["inertia_yy"])
-    alpha0 = truth["CZ_0"]/(truth["CX_0"] - truth["CZ_alpha"])
-    drag = -(truth["CX_0"] + alpha0*(truth["CX_alpha"] + alpha0*truth["CX_alpha2"]))/np.cos(alpha0)
+    drag = zero_lift_drag(truth) + truth["CD_parasite"]
     return {
         "quasi_CL_alpha": truth["CX_0"] - truth["CZ_alpha"],
         "quasi_CL_elevator": -truth["CZ_elevator"],
-        "quasi_CD_0": drag + truth["CD_parasite"],
+        "quasi_CD_0": drag,
         "quasi_Cm_alpha": (truth["Cm_alpha"] + lag*truth["CZ_alpha"])/inertia,
         "quasi_Cm_q": (truth["Cm_q"] + lag*truth["CZ_q"])/inertia,
         "quasi_Cm_elevator": (truth["Cm_elevator"] + lag*truth["CZ_elevator"])/inertia,

@@ -46,7 +46,7 @@ def summary(flight: Flight) -> dict[str, Any]:
         "ended_by": flight.reason or "time",
         "eta_wing": float(0.5*(truth["eta_left_wing"][-1] + truth["eta_right_wing"][-1])),
         "eta_tail": float(truth["eta_htail"][-1]),
-        "excess_CD_0": float(truth["quasi_CD_0"][-1] - truth["quasi_CD_0"][0]),
+        "excess_CD_0": float(truth["excess_CD_0"][-1]),
         "estimated_excess_CD_0": float(flight.estimate["excess_drag"][-1]),
         "severity": float(advisory["severity"][-1]),
         "ice_detected_at_s": float(truth["time"][detected[0]]) if len(detected) else None,
