@@ -115,7 +115,7 @@ class Scenario(Strict):
     cloud: tuple[CloudPoint, ...] = ()
     events: tuple[Event, ...] = ()
     doublets_at: tuple[float, ...] = ()  # s, starts of doublet sets
-    doublet_scale: float = Limited(1.0, gt=0.0, le=3.0)  # 1: 0.25 g at 72 m/s
+    doublet_scale: float = Limited(1.0, gt=0.0, le=3.0)  # 1: 0.32 g at 72 m/s
     randomise: Randomise = Randomise()
 
     def clean_parameters(self) -> NDArray:

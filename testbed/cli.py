@@ -20,6 +20,7 @@ VERBS = {
     "fly": "Fly a scenario and write its record.",
     "effects": "List the ways in which an aircraft may differ from its model.",
     "compare": "Fly controllers with and without protection on the same cases.",
+    "reproduce": "Put the founding paper's numbers beside ours.",
     "benchmark": "Measure how fast the testbed is.",
     "identify": "Estimate aerodynamic derivatives from flight records.",
 }

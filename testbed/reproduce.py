@@ -1,0 +1,39 @@
+"""`icing reproduce`: every number of the founding paper that the project can put its own beside.
+
+An item is a function of the seed that returns rows. Rules of agreement are fixed per sort of number; nothing is tuned
+per row and a disagreement stays visible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib import import_module
+
+from icing_env.errors import InputError, nearest
+from testbed.reproduce_row import Row
+
+Item = Callable[[int], list[Row]]
+ITEMS: dict[str, tuple[str, str]] = {  # module of the item's `rows`, and what it is
+    "table1": ("table1", "the test matrix, every case flown"),
+}
+
+
+def reproduce(names: Sequence[str] = ("all",), seed: int = 0, progress: Callable[[str], None] | None = None
+              ) -> list[Row]:
+    """Rows of the items asked for, "all" for every one.
+
+    Raises:
+        InputError: no such item.
+    """
+    wanted = list(ITEMS) if "all" in names or not names else list(names)
+    for name in wanted:
+        if name not in ITEMS:
+            raise InputError(f"nothing to reproduce under '{name}': {nearest(name, [*ITEMS, 'all'])}")
+    found: list[Row] = []
+    for name in wanted:
+        module, what = ITEMS[name]
+        if progress is not None:
+            progress(f"{name}: {what}")
+        item: Item = import_module(f"testbed.reproduce_{module}").rows
+        found += item(seed)
+    return found
