@@ -1,0 +1,34 @@
+"""The examples run as they stand."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+
+
+def run(name: str, *arguments: str) -> str:
+    done = subprocess.run([sys.executable, str(EXAMPLES / name), *arguments], capture_output=True, text=True, timeout=300,
+                          check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return done.stdout
+
+
+@pytest.mark.parametrize(("name", "lines"), [("first_flight.py", 6), ("own_effect.py", 3), ("estimator_in_the_loop.py", 2)])
+def test_an_example_prints_what_it_promises(name: str, lines: int) -> None:
+    assert len(run(name).strip().splitlines()) == lines
+
+
+def test_the_estimator_finds_the_ice_that_the_blind_one_misses() -> None:
+    seeing, blind = run("estimator_in_the_loop.py").splitlines()
+    severity = [float(line.split("severity ")[1].split(",")[0]) for line in (seeing, blind)]
+    assert severity[0] > 0.2 > 0.05 > severity[1]
+
+
+def test_training_starts() -> None:
+    pytest.importorskip("stable_baselines3", reason="the extra `learning` is not installed")
+    assert "ep_rew_mean" in run("train_ppo.py", "40000")
