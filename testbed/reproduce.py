@@ -15,6 +15,11 @@ from testbed.reproduce_row import Row
 Item = Callable[[int], list[Row]]
 ITEMS: dict[str, tuple[str, str]] = {  # module of the item's `rows`, and what it is
     "table1": ("table1", "the test matrix, every case flown"),
+    "tables2_5": ("methods", "H-infinity against stepwise regression, clear and iced"),
+    "flight_010302f1": ("flight", "figures 1 to 7: one flight through glaze ice, event by event"),
+    "fig15_16": ("deicing", "selective de-icing"),
+    "fig17_18": ("boots", "boots on a three-minute cycle"),
+    "textbook": ("textbook", "recorded flights of the same aircraft against the textbook"),
 }
 
 

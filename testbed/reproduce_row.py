@@ -50,8 +50,10 @@ class Rule:
     def text(self, unit: str) -> str:
         """The rule in words."""
         if not (self.absolute or self.relative):
-            return "equal"
-        size = f"{self.absolute:g}{'' if unit == '1' else ' ' + unit}" if self.absolute else f"{100*self.relative:g} %"
+            return "not lower" if self.at_least else "equal"
+        size = f"{100*self.relative:g} %"
+        if self.absolute:
+            size = f"{self.absolute:g} {'points' if unit == '%' else '' if unit == '1' else unit}".rstrip()
         return f"not lower by more than {size}" if self.at_least else f"within {size}"
 
 
