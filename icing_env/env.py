@@ -53,7 +53,8 @@ class TwinOtterEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._window: Any = None
         names = self.world.task.dtype.names or ()
         first, last = names.index(f"reward_{REWARD_TERMS[0]}"), names.index("reason")
-        self._numbers = self.world.task.view(np.float64)[first:last + 1]  # reward terms, their sum, ..., reason
+        self._numbers = self.world.task.view(np.float64)[first:last + 1]  # reward terms, their sum, ..., truncated, reason
+        self._seen = self.world.view.out[0]
         self._seeded = False
 
     @property
@@ -85,8 +86,7 @@ class TwinOtterEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self.render_mode == "human":
             self._show()
         numbers = self._numbers.tolist()
-        return (self.world.view.out[0].copy(), numbers[N_TERMS], numbers[-1] > 0.0,
-                bool(self.world.steps[0] >= self.world.limit), _info(numbers))
+        return self._seen.copy(), numbers[N_TERMS], numbers[-1] > 0.0, numbers[-2] > 0.0, _info(numbers)
 
     def render(self) -> NDArray[np.uint8] | None:
         """Primary flight display: a frame for "rgb_array"; "human" shows it in a window."""

@@ -78,6 +78,7 @@ CHANNELS: tuple[Channel, ...] = (
         ("bank_limit", "rad", 0.0, TURN), ("flap_limit", "rad", 0.0, 2.0), ("intervention", "rad", -1.0, 1.0))),
 )  # fmt: skip
 SOURCES: tuple[Source, ...] = ("measurement", "task", "estimate", "advisory")
+N_BOUNDS = len(SOURCES) + 1
 
 
 def channels(axes: Axes) -> tuple[Channel, ...]:
@@ -95,29 +96,34 @@ class Observation:
         self.channels = channels(axes)
         names = {"measurement": MEASUREMENT.names, "task": task_dtype.names, "estimate": ESTIMATE.names,
                  "advisory": ADVISORY.names}
-        self.bounds = np.cumsum([0, *(sum(c.source == s for c in self.channels) for s in SOURCES)])
-        self.index = np.array([(names[c.source] or ()).index(c.name) for c in self.channels])
+        bounds = np.cumsum([0, *(sum(c.source == s for c in self.channels) for s in SOURCES)])
+        index = [(names[c.source] or ()).index(c.name) for c in self.channels]
+        self.layout = np.array([*bounds, *index], np.int64)
         self.low = np.array([c.low for c in self.channels], np.float32)
         self.high = np.array([c.high for c in self.channels], np.float32)
-        self.gain = np.array([
-            1.0/float(reference[c.name][0]) if c.name[0] == "C" and reference[c.name][0] != 0.0 else 1.0
-            for c in self.channels])
+        gain = [1.0/float(reference[c.name][0]) if c.name[0] == "C" and reference[c.name][0] != 0.0 else 1.0
+                for c in self.channels]
+        self.scaling = np.array([gain, self.low, self.high])
         self.out = np.zeros((n, len(self.channels)), np.float32)
 
 
 @kernel
-def gather(i: int, measurement: Any, task: Any, estimate: Any, advisory: Any, bounds: Any, index: Any, gain: Any,
-           low: Any, high: Any, out: Any) -> None:
-    """Observation of row `i`; sources are float64 views [n, fields], channels lie source by source within `bounds`."""
-    pick(i, measurement, bounds[0], bounds[1], index, gain, low, high, out)
-    pick(i, task, bounds[1], bounds[2], index, gain, low, high, out)
-    pick(i, estimate, bounds[2], bounds[3], index, gain, low, high, out)
-    pick(i, advisory, bounds[3], bounds[4], index, gain, low, high, out)
+def gather(i: int, measurement: Any, task: Any, estimate: Any, advisory: Any, layout: Any, scaling: Any,
+           out: Any) -> None:
+    """Observation of row `i`.
+
+    Sources are float64 views [n, fields]. `layout`: the bounds of the sources' channels, then each channel's field;
+    `scaling`: gain, low and high of each channel.
+    """
+    pick(i, measurement, layout[0], layout[1], layout, scaling, out)
+    pick(i, task, layout[1], layout[2], layout, scaling, out)
+    pick(i, estimate, layout[2], layout[3], layout, scaling, out)
+    pick(i, advisory, layout[3], layout[4], layout, scaling, out)
 
 
 @kernel
-def pick(i: int, source: Any, first: int, last: int, index: Any, gain: Any, low: Any, high: Any, out: Any) -> None:
+def pick(i: int, source: Any, first: int, last: int, layout: Any, scaling: Any, out: Any) -> None:
     """Copy, scale and clip the channels of one source; a value that is no number becomes the lower bound."""
     for j in range(first, last):
-        value = np.float32(source[i, index[j]]*gain[j])
-        out[i, j] = min(max(value, low[j]), high[j]) if value == value else low[j]
+        value = source[i, layout[N_BOUNDS + j]]*scaling[0, j]
+        out[i, j] = min(max(value, scaling[1, j]), scaling[2, j]) if value == value else scaling[1, j]

@@ -39,7 +39,10 @@ TASK_FIELDS: list[Field] = [
     ("elevator_before", "rad", "elevator command a step ago"),
     ("aileron_before", "rad", "aileron command a step ago"),
     ("rudder_before", "rad", "rudder command a step ago"),
-    ("reason", "1", "index in REASONS; not 0 ends the episode"),
+    ("steps", "1", "steps flown in this episode"),
+    ("limit", "1", "steps after which its time is over"),
+    ("truncated", "0/1", "its time is over"),
+    ("reason", "1", "index in REASONS; not 0 terminates the episode"),
 ]
 TASK = structured(TASK_FIELDS)
 WEIGHTS = np.dtype([(term, "f8") for term in REWARD_TERMS])
@@ -103,7 +106,7 @@ def measure_errors(k: Any, g: Any, m: Any) -> None:
 
 @kernel
 def judge(k: Any, w: Any, x: Any, o: Any, c: Any, u: Any, p: Any) -> None:
-    """Reward terms and the end of the episode, from the truth."""
+    """Count of the step, reward terms and the end of the episode, from the truth."""
     margin = min(c.alpha_stall_left, c.alpha_stall_right) + p.alpha_stall_flap*x.flap - o.alpha
     k.reward_alive = w.alive
     k.reward_altitude = w.altitude*square(k.altitude_error, 50.0)
@@ -115,6 +118,8 @@ def judge(k: Any, w: Any, x: Any, o: Any, c: Any, u: Any, p: Any) -> None:
         + square(u.rudder - k.rudder_before, 0.1))/3.0
     k.reward_envelope = -w.envelope*min(max(1.0 - margin/0.05, 0.0), 1.0)
     k.elevator_before, k.aileron_before, k.rudder_before = u.elevator, u.aileron, u.rudder
+    k.steps += 1.0
+    k.truncated = 1.0 if k.steps >= k.limit else 0.0
     k.reason = ending(x, o, p)
     k.reward_terminal = -w.terminal if k.reason > 0.0 else 0.0
     k.reward = (k.reward_alive + k.reward_altitude + k.reward_airspeed + k.reward_heading + k.reward_climb_rate

@@ -27,24 +27,22 @@ from icing_env.types import COMMAND, SURFACES
 
 @entry
 def conclude(task: Any, target: Any, weights: Any, measurement: Any, state: Any, outcome: Any, current: Any,
-             command: Any, parameters: Any, steps: Any, seen: Any, tasks: Any, estimates: Any, advice: Any,
-             bounds: Any, index: Any, gain: Any, low: Any, high: Any, out: Any) -> None:
+             command: Any, parameters: Any, seen: Any, tasks: Any, estimates: Any, advice: Any, layout: Any,
+             scaling: Any, out: Any) -> None:
     """After a step, for every row: its count, references, errors, rewards, ending, observation."""
     shared = len(parameters) == 1
     for i in range(len(task)):
-        steps[i] += 1
         refer(task[i], target[i], measurement[i].time)
         measure_errors(task[i], target[i], measurement[i])
         judge(task[i], weights[0], state[i], outcome[i], current[i], command[i], parameters[0 if shared else i])
-        gather(i, seen, tasks, estimates, advice, bounds, index, gain, low, high, out)
+        gather(i, seen, tasks, estimates, advice, layout, scaling, out)
 
 
 @entry
-def look(seen: Any, tasks: Any, estimates: Any, advice: Any, bounds: Any, index: Any, gain: Any, low: Any, high: Any,
-         out: Any) -> None:
+def look(seen: Any, tasks: Any, estimates: Any, advice: Any, layout: Any, scaling: Any, out: Any) -> None:
     """Observation of every row."""
     for i in range(out.shape[0]):
-        gather(i, seen, tasks, estimates, advice, bounds, index, gain, low, high, out)
+        gather(i, seen, tasks, estimates, advice, layout, scaling, out)
 
 
 class World:
@@ -72,12 +70,11 @@ class World:
         self.loop.attach(self.fleet.measurement, self.fleet.command)
         self.task, self.trimmed, self.weights = np.zeros(n, TASK), np.zeros(n, COMMAND), scenario.weights()
         self.seed, self.episode = np.zeros(n, np.uint64), np.zeros(n, np.int64)
-        self.steps = np.zeros(n, np.int64)
         self.limit = round(scenario.duration/dt)
         self.doublets = schedule(scenario.doublets())
         self.clean_estimate = self.loop.estimate[:1].copy()
         self.view = Observation(axes, n, TASK, self.clean_estimate)
-        self.action = np.zeros((n, len(actions.names(mode, axes)) if mode else 0))
+        self.action = np.zeros((n, len(actions.names(mode, axes)) if mode else 0), np.float32)
         self.scheduled = bool(scenario.cloud or scenario.events)
         self._shape = self.action.shape
         self._bind(mode, axes)
@@ -87,9 +84,9 @@ class World:
         views = [a.view(np.float64).reshape(self.n, -1)
                  for a in (f.measurement, self.task, loop.estimate, loop.advisory)]
         v = self.view
-        layout = (*views, v.bounds, v.index, v.gain, v.low, v.high, v.out)
+        layout = (*views, v.layout, v.scaling, v.out)
         self._conclude = bound(conclude, self.task, loop.target, self.weights, f.measurement, f.state, f.outcome,
-                               f.current, f.command, f.parameters, self.steps, *layout)
+                               f.current, f.command, f.parameters, *layout)
         self._look = bound(look, *layout)
         self._excite = bound(excite, f.command, f.measurement, self.doublets) if len(self.doublets) else None
         self._check = bound(actions.first_bad_row, self.action, -1.0, 1.0)
@@ -158,11 +155,12 @@ class World:
             command[name] = np.clip(command[name], 0.0, 1.0)
         state["seed"] = seeds
         f.state[rows], f.command[rows], self.trimmed[rows] = state, command, command
-        self.steps[rows] = 0
+        self.task["steps"][rows] = 0.0
         self._follow_schedule(rows)
         f.start(rows)
         k = self.task[rows]
         k[:] = 0
+        k["limit"] = self.limit
         k["kind"] = TASKS.index(self.scenario.task.kind)
         k["start_altitude"], k["start_heading"] = f.measurement["altitude"][rows], condition["heading"]
         k["start_airspeed"] = condition["airspeed"]
@@ -218,7 +216,7 @@ class World:
             self._excite()
         self._protect()
         self._fly()
-        if self.scheduled and self.steps[0] % self.fleet.clocks[1] == 0:
+        if self.scheduled and self.task["steps"][0] % self.fleet.clocks[1] == 0:
             self._follow_schedule(np.arange(self.n))
         self._observe()
         self._conclude()
@@ -258,6 +256,11 @@ class World:
         return draw(view)
 
     @property
+    def steps(self) -> NDArray[np.float64]:
+        """Steps flown in each episode [n]."""
+        return self.task["steps"]
+
+    @property
     def terminated(self) -> NDArray[np.bool_]:
         """Which episodes ended in ground contact, structural failure or upset [n]."""
         return self.task["reason"] > 0.0
@@ -265,13 +268,13 @@ class World:
     @property
     def truncated(self) -> NDArray[np.bool_]:
         """Which episodes reached the end of their time [n]."""
-        return self.steps >= self.limit
+        return self.task["truncated"] > 0.0
 
     def _arrays(self) -> dict[str, NDArray]:
         f = self.fleet
         return {"state": f.state, "measurement": f.measurement, "current": f.current, "command": f.command,
                 "outcome": f.outcome, "parameters": f.parameters, "task": self.task, "trimmed": self.trimmed,
-                "seed": self.seed, "episode": self.episode, "steps": self.steps, "observation": self.view.out,
+                "seed": self.seed, "episode": self.episode, "observation": self.view.out,
                 **{f"loop_{name}": array for name, array in self.loop.memory().items()}}
 
     def save(self) -> dict[str, NDArray]:
