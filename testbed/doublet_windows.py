@@ -30,6 +30,7 @@ class Window:
         excess_drag: mean of what the observer in flight believed in this window.
         load_factor: half of the peak-to-peak load factor of the elevator doublets, measured [g].
         truth: mean of true quantities by name.
+        trim: mean of measured channels by name, in the steady stretch before the doublets.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Window:
     excess_drag: float
     load_factor: float
     truth: dict[str, float]
+    trim: dict[str, float]
 
 
 def fly_sets(scenario: Scenario, seed: int = 0, *, hinf: bool = True) -> tuple[dict[str, Window], Flight]:
@@ -59,13 +61,20 @@ def fly_sets(scenario: Scenario, seed: int = 0, *, hinf: bool = True) -> tuple[d
             event.name, equation_error.identify(record), hinf_record.identify(record) if hinf else {},
             float(np.mean(flight.estimate["excess_drag"][rows])),
             load_factor_of(record, doublet_set(event.time, scale=scenario.doublet_scale)),
-            {name: float(np.mean(values[rows])) for name, values in flight.truth.items()})
+            {name: float(np.mean(values[rows])) for name, values in flight.truth.items()},
+            steady(record, event.time))
     return found, flight
 
 
 def part(record: FlightRecord, rows: NDArray[np.bool_]) -> FlightRecord:
     """Some samples of a record."""
     return replace(record, channels={name: values[rows] for name, values in record.channels.items()})
+
+
+def steady(record: FlightRecord, until: float) -> dict[str, float]:
+    """Mean of every channel before a time [s], without the instants at which it was not sampled."""
+    rows = record["time"] < until
+    return {name: float(np.nanmean(values[rows])) for name, values in record.channels.items()}
 
 
 def load_factor_of(record: FlightRecord, doublets: tuple[Doublet, ...]) -> float:

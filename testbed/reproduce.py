@@ -19,6 +19,8 @@ ITEMS: dict[str, tuple[str, str]] = {  # module of the item's `rows`, and what i
     "flight_010302f1": ("flight", "figures 1 to 7: one flight through glaze ice, event by event"),
     "fig15_16": ("deicing", "selective de-icing"),
     "fig17_18": ("boots", "boots on a three-minute cycle"),
+    "fig19": ("correlation", "drag and derivatives against the severity eta"),
+    "fig21_22": ("trim", "trim with and without ice"),
     "textbook": ("textbook", "recorded flights of the same aircraft against the textbook"),
 }
 

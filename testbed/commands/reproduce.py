@@ -14,7 +14,8 @@ from testbed.commands.common import print_json, print_table, verb
 def command(names: tuple[str, ...], as_json: bool, seed: int) -> None:
     """Put the founding paper's tables and figures beside what flies and is identified here.
 
-    ITEM is one or several of table1, tables2_5, flight_010302f1, fig15_16, fig17_18, textbook; all if omitted.
+    ITEM is one or several of table1, tables2_5, flight_010302f1, fig15_16, fig17_18, fig19, fig21_22,
+    textbook; all if omitted.
     Rows marked `simulated` are analogues, rows marked `recorded` come from recorded flights and are left out where
     these are absent. When a row agrees is fixed per sort of number; disagreements are shown with their reason.
     """
