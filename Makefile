@@ -34,7 +34,7 @@ lint: $(FULL)  ## style, types, import contracts
 wheel: $(FULL)  ## build the wheel, and test it outside the checkout
 	rm -rf dist
 	$(BIN)/python -m build --wheel --outdir dist .
-	$(BIN)/python -m pytest -q -m slow tests/test_wheel.py
+	$(BIN)/python -m pytest -q tests/test_wheel.py
 
 install: $(CORE)  ## the core alone
 
