@@ -17,6 +17,7 @@ import click
 from icing_env.errors import InputError, nearest
 
 VERBS = {
+    "demo": "Fly the demonstration and write its report.",
     "fly": "Fly a scenario and write its record.",
     "effects": "List the ways in which an aircraft may differ from its model.",
     "compare": "Fly controllers with and without protection on the same cases.",

@@ -119,6 +119,10 @@ class Report:
                 self._add(Block("paragraph", " ".join(paragraph.split())))
         return self
 
+    def code(self, text: str) -> Report:
+        """Add lines of code, set as they are."""
+        return self._add(Block("code", text.strip("\n")))
+
     def verdict(self, text: str, kind: str = "info") -> Report:
         """Add a verdict; those that are not "info" are gathered at the head of the report as well.
 
