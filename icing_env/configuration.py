@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -77,7 +77,8 @@ def _explain(model: type[BaseModel], problem: ValidationError) -> str:
 def _keys(model: type[BaseModel], parents: tuple[Any, ...]) -> list[str]:
     for part in parents:
         field = model.model_fields.get(str(part))
-        inner = field.annotation if field is not None else None
-        if isinstance(inner, type) and issubclass(inner, BaseModel):
-            model = inner
+        inner = (field.annotation, *get_args(field.annotation)) if field is not None else ()
+        for kind in inner:  # itself, or what a tuple or dict holds
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                model = kind
     return list(model.model_fields)
