@@ -1,0 +1,208 @@
+"""What is tried against a record: the model, its own uncertainty, every effect at several sizes, and the unknown.
+
+The unknown is a set of generic discrepancies that stand for whatever the library lacks.
+
+Every candidate is one row of a batch; rows mean the same in every record, so that evidence of several records adds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icing_env import effects
+from icing_env.atmosphere import density
+from icing_env.effects import Effect, Parameter
+from icing_env.record import FloatArray
+from icing_env.types import DERIVATIVE_NAMES
+from sim2real.channels import LATERAL, MEASURED, TOLERANCE
+from sim2real.predictor import Push
+from sim2real.reconstruct import Reconstruction
+
+# The published sets of derivatives differ by about 5 % where they are well identified; taken as two standard
+# deviations of the model's own uncertainty. A record's mass is known to about 1 % (assumed).
+SPREAD, MASS_SPREAD = 0.025, 0.01
+LAG_SPREAD = 0.02  # s, of an actuator's lag that nobody has measured (assumed)
+NUISANCE_STEP = 2.0  # standard deviations at which the derivative with respect to a nuisance is taken
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """One direction in which the model may be wrong without that being a gap; prior N(0, 1) in its own unit."""
+
+    name: str
+    parameter: str  # of PARAMETERS
+    factor: float  # relative standard deviation (or absolute, where `absolute`)
+    absolute: bool = False
+
+
+@dataclass(frozen=True)
+class Family:
+    """One parameter of one effect, the others neutral: rows `first + i` at `nodes[i]`."""
+
+    effect: Effect
+    parameter: Parameter
+    nodes: tuple[float, ...]
+    rows: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Term:
+    """A generic discrepancy: `target` (force, moment or sensor component) with a time course made of the record."""
+
+    component: str
+    name: str
+    target: str
+    row: int
+
+
+@dataclass(frozen=True)
+class Bank:
+    """All rows: 0 is the model, then nuisances, effects, generic terms."""
+
+    nuisances: tuple[Nuisance, ...]
+    families: tuple[Family, ...]
+    terms: tuple[Term, ...]
+    size: int
+    excluded: Mapping[str, str] = field(default_factory=dict)  # effect: why it is not tried
+
+
+def nuisances() -> tuple[Nuisance, ...]:
+    """Every non-zero derivative by `SPREAD`, the mass by `MASS_SPREAD`, the actuators' lags."""
+    derivatives = [Nuisance(name, name, SPREAD) for name in DERIVATIVE_NAMES]
+    lags = [Nuisance(f"{s}_lag", f"{s}_lag", LAG_SPREAD, True) for s in ("elevator", "aileron", "rudder")]
+    return (*derivatives, Nuisance("mass", "mass", MASS_SPREAD), *lags)
+
+
+def nodes(parameter: Parameter) -> tuple[float, ...]:
+    """Sizes at which an effect is flown: its typical size, multiples of it, and the ends of its range."""
+    reach = parameter.typical or 0.5 * max(parameter.high, -parameter.low) * 0.5
+    wanted = [parameter.low, parameter.high, reach, -reach, 2.5 * reach, -2.5 * reach]
+    found: list[float] = []
+    span = parameter.high - parameter.low
+    for value in sorted(wanted, key=lambda v: abs(abs(v) - abs(reach))):
+        inside = parameter.low - 1e-12 <= value <= parameter.high + 1e-12
+        if inside and abs(value - parameter.neutral) > 0.02 * span and all(abs(value - v) > 0.06 * span for v in found):
+            found.append(value)
+    return tuple(sorted(found))
+
+
+def bank(without: Iterable[str] = ()) -> Bank:
+    """The candidates of the whole library less `without`."""
+    noise, families, terms = nuisances(), [], []
+    row = 1 + len(noise)
+    for effect in effects.LIBRARY.values():
+        if effect.name in without or effect.name == "turbulence":
+            continue
+        for parameter in effect.parameters:
+            sizes = nodes(parameter)
+            families.append(Family(effect, parameter, sizes, tuple(range(row, row + len(sizes)))))
+            row += len(sizes)
+    for component, target, names in GENERIC:
+        for name in names:
+            terms.append(Term(component, name, target, row))
+            row += 1
+    return Bank(noise, tuple(families), tuple(terms), row)
+
+
+def parameter_rows(flight: Reconstruction, candidates: Bank) -> NDArray:
+    """PARAMETERS of every row for one record."""
+    base = flight.parameters
+    rows = np.repeat(base, candidates.size)
+    for j, nuisance in enumerate(candidates.nuisances, start=1):
+        value = base[nuisance.parameter][0]
+        step = NUISANCE_STEP * nuisance.factor
+        rows[nuisance.parameter][j] = value + step if nuisance.absolute else value * (1.0 + step)
+    for family in candidates.families:
+        chosen = list(family.rows)
+        rows[chosen] = effects.with_effects(
+            rows[chosen], {family.effect.name: {family.parameter.name: np.array(family.nodes)}})
+    return rows
+
+
+# Generic discrepancies: component, what they act on, time courses ("1" constant, products of deviations, "time").
+GENERIC: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+    ("x_force", "u", ("1", "alpha", "alpha*alpha", "airspeed", "elevator", "time")),
+    ("z_force", "w", ("1", "alpha", "q", "elevator", "alpha*alpha", "airspeed", "time")),
+    ("pitching_moment", "q", ("1", "alpha", "q", "elevator", "alpha*alpha", "alpha*elevator", "airspeed", "time")),
+    ("y_force", "v", ("1", "beta", "p", "r", "rudder", "alpha*beta", "time")),
+    ("rolling_moment", "p", ("1", "beta", "p", "r", "aileron", "rudder", "alpha*beta", "time")),
+    ("yawing_moment", "r", ("1", "beta", "p", "r", "aileron", "rudder", "alpha*beta", "time")),
+    *((f"sensor:{c}", c, ("1", c, f"{c}_dot", "time")) for c in MEASURED[:12]),
+)
+# One standard deviation of a generic coefficient with a time course of unit size (assumed: a quarter of the change
+# that typical effects of the library make).
+GENERIC_SIZE = {"u": 0.008, "w": 0.03, "v": 0.01, "p": 0.002, "q": 0.015, "r": 0.002}
+DEVIATION = {"alpha": 0.05, "beta": 0.05, "q": 0.1, "p": 0.2, "r": 0.1, "elevator": 0.04, "aileron": 0.08,
+             "rudder": 0.05, "airspeed": 5.0}  # fmt: skip  # what counts as one unit of a regressor (assumed)
+
+
+def pushes(flight: Reconstruction, candidates: Bank) -> tuple[Push, ...]:
+    """The time courses of the generic terms along one record."""
+    scale = _scales(flight)
+    out = []
+    for term in candidates.terms:
+        sensor = term.component.startswith("sensor:")
+        if sensor:
+            series = _sensor_course(flight, term.name, term.target)
+        else:
+            series = GENERIC_SIZE[term.target] * scale[term.target] * _course(flight, term.name)
+        out.append(Push(term.row, term.target, series, sensor))
+    return tuple(out)
+
+
+def _course(flight: Reconstruction, name: str) -> FloatArray:
+    """Product of the deviations named, in units of DEVIATION; a ramp from -1 to 1 for time."""
+    n = len(flight.time)
+    if name == "1":
+        return np.ones(n)
+    if name == "time":
+        return np.linspace(-1.0, 1.0, n)
+    out = np.ones(n)
+    for factor in name.split("*"):
+        values = flight.controls[factor] if factor in flight.controls else flight.channel(factor)
+        out = out * (values - np.median(values)) / DEVIATION[factor]
+    return out
+
+
+def _sensor_course(flight: Reconstruction, name: str, channel: str) -> FloatArray:
+    """Bias of one tolerance, scale error of 10 %, a lag of 0.1 s, or a drift over the record."""
+    tolerance = TOLERANCE[channel]
+    if name in ("1", "time"):
+        return tolerance * _course(flight, name)
+    values = flight.channel(channel)
+    if name.endswith("_dot"):
+        return -0.1 * np.diff(values, prepend=values[:1]) / flight.dt  # backward: nothing of the sample to come
+    return 0.1 * (values - (0.0 if channel in ("alpha", "beta", "p", "q", "r") else np.median(values)))
+
+
+def _scales(flight: Reconstruction) -> dict[str, float]:
+    """Acceleration per unit coefficient [m/s2, rad/s2] at the record's median condition."""
+    p = flight.parameters[0]
+    rho = density(float(np.median(flight.altitude)))
+    qs = 0.5 * rho * float(np.median(flight.channel("airspeed"))) ** 2 * p["wing_area"]
+    return {"u": qs / p["mass"], "v": qs / p["mass"], "w": qs / p["mass"], "p": qs * p["span"] / p["inertia_xx"],
+            "q": qs * p["chord"] / p["inertia_yy"], "r": qs * p["span"] / p["inertia_zz"]}  # fmt: skip
+
+
+def not_testable(flight_list: list[Reconstruction], candidates: Bank) -> dict[str, str]:
+    """Effects that none of the records can show, for want of channels, with the reason."""
+    out = {"turbulence": "gust intensity is estimated with the noise, as part of what no model is expected to know"}
+    commands = {name for flight in flight_list for name in flight.commands}
+    has_beta = any(flight.has("beta") and flight.has("p") and flight.has("r") for flight in flight_list)
+    torque = any(flight.power_from == "torque" for flight in flight_list)
+    for family in candidates.families:
+        effect = family.effect
+        for surface in ("elevator", "aileron", "rudder"):
+            if f"{surface}_path" in effect.enters_at and f"{surface}_command" not in commands:
+                out[effect.name] = f"needs {surface}_command: positions alone do not show how it follows"
+        if effect.name == "spool_lag" and not (torque and "throttle_left" in commands):
+            out[effect.name] = "needs torque and throttle"
+        lateral = {"y_force", "rolling_moment", "yawing_moment", *(f"sensor:{c}" for c in LATERAL)}
+        enters = set(effect.enters_at)
+        if not has_beta and enters <= lateral | {"mass", "propulsion"} and enters & lateral:
+            out[effect.name] = "needs beta, p and r"
+    return out

@@ -1,0 +1,260 @@
+"""From flight records to a diagnosis: where the gap lies, which effect explains it, how far it closes."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icing_env import aircraft, effects
+from icing_env.errors import InputError, nearest
+from icing_env.jit import source_hash
+from icing_env.record import DataProblem, FlightRecord
+from sim2real import gap
+from sim2real.attribution import P_NONE, P_UNKNOWN, Posterior, attribute
+from sim2real.candidates import SPREAD, Bank, bank, not_testable
+from sim2real.evidence import Evidence, gather
+from sim2real.manoeuvre import next_manoeuvre
+from sim2real.reconstruct import Reconstruction, reconstruct
+from sim2real.references import Baseline, fit_baseline
+from sim2real.where import components, describe_unknown, regimes
+from sim2real.windows import FREE, cut
+
+LISTED = 0.01  # effects at least this probable are described one by one
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The answer, field by field as the interface fixes it (see docs/diagnosis.md)."""
+
+    verdict: str
+    hypotheses: list[dict[str, Any]]
+    credible_set_95: list[int]
+    where: dict[str, Any]
+    effects: list[dict[str, Any]]
+    not_testable: list[dict[str, str]]
+    detection_limits: dict[str, dict[str, Any]]
+    unknown: dict[str, Any] | None
+    gap: dict[str, Any]
+    next_manoeuvre: dict[str, Any] | None
+    resimulate: dict[str, Any]
+    data_problems: list[dict[str, Any]]
+    provenance: dict[str, Any]
+    seconds: float
+    details: Details = field(repr=False, metadata={"json": False})
+
+
+@dataclass(frozen=True)
+class Details:
+    """What a report draws beyond the answer."""
+
+    flights: tuple[Reconstruction, ...]
+    held_out: tuple[Reconstruction, ...]
+    evidences: tuple[Evidence, ...]
+    posterior: Posterior
+    change: Callable[[NDArray], NDArray]
+    training: gap.Energy
+    tested: gap.Energy | None
+
+
+def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] = (),
+             reference: Sequence[FlightRecord] = (), without: Iterable[str] = (), seed: int = 0,
+             progress: Progress = lambda text: None) -> Diagnosis:
+    """Diagnose the gap between the model and the aircraft that flew `records`.
+
+    Args:
+        records: to diagnose, of one aircraft in one condition.
+        held_out: never fitted; the closure is measured on them.
+        reference: the same aircraft without the gap; they correct the model first.
+        without: effects to leave out of the library.
+        seed: of the synthetic records behind the gap without a gap.
+        progress: told what is being done.
+
+    Raises:
+        InputError: no records, an unknown effect in `without`, or a record that cannot be used.
+    """
+    began = time.perf_counter()
+    if not records:
+        raise InputError("no record to diagnose: give at least one flight record")
+    without = tuple(without)
+    for name in without:
+        if name not in effects.LIBRARY:
+            raise InputError(f"no effect '{name}' to leave out: {nearest(name, list(effects.LIBRARY))}")
+    candidates = bank(without)
+    baseline = Baseline(aircraft.load(), np.eye(len(candidates.nuisances)))
+    if reference:
+        progress("fitting the model to the reference flights")
+        baseline = fit_baseline([reconstruct(r) for r in reference], candidates)
+    flights = [reconstruct(r, baseline.parameters) for r in records]
+    others = [reconstruct(r, baseline.parameters) for r in held_out]
+    evidences = []
+    for i, flight in enumerate(flights, start=1):
+        progress(f"flying {candidates.size} variants along record {i} of {len(flights)}")
+        evidences.append(gather(flight, candidates))
+    untestable = not_testable(flights, candidates)
+    posterior = weigh(evidences, candidates, untestable, baseline)
+    progress("flying the records freely, before and after")
+    verdict, hypotheses = judge(posterior)
+    change = remedy(verdict, posterior)
+    sigma = float(np.mean([e.sigma_w for e in evidences]))
+    training = gap.together([gap.energies(f, change, e.sigma_w, seed + i)
+                             for i, (f, e) in enumerate(zip(flights, evidences, strict=True))])
+    tested = gap.together([gap.energies(f, change, sigma, seed + 1000 + i) for i, f in enumerate(others)]
+                          ) if others else None
+    progress("looking for what to fly next")
+    return Diagnosis(
+        verdict=verdict,
+        hypotheses=hypotheses,
+        credible_set_95=credible([h["probability"] for h in hypotheses]),
+        where={"channels": gap.by_channel(training.before), "components": components(posterior),
+               "regimes": regimes(evidences)},
+        effects=[describe(name, posterior) for name, p in ranked(posterior) if p >= LISTED],
+        not_testable=[{"effect": name, "why": why} for name, why in sorted(untestable.items())],
+        detection_limits=detection_limits(posterior),
+        unknown=describe_unknown(posterior),
+        gap={"training": {"before": gap.g(training.before, training.alone),
+                          "after": gap.g(training.after, training.alone)},
+             "held_out": gap.held_out(tested, seed)},
+        next_manoeuvre=_next(flights[0], candidates, posterior, hypotheses, sigma),
+        resimulate=resimulation(verdict, posterior, training, flights, evidences),
+        data_problems=[_problem(p) for f in (*flights, *others) for p in f.record.problems if not _slow(p, f.record)],
+        provenance=provenance(flights, others, evidences, without, len(reference), seed),
+        seconds=time.perf_counter() - began,
+        details=Details(tuple(flights), tuple(others), tuple(evidences), posterior, change, training, tested),
+    )
+
+
+def weigh(evidences: Sequence[Evidence], candidates: Bank, untestable: dict[str, str],
+          baseline: Baseline) -> Posterior:
+    """Posterior of all records together; effects whose whole range would not show are added to `untestable`."""
+    gram = np.sum([e.gram for e in evidences], axis=0)
+    posterior = attribute(gram, candidates, tuple(untestable), baseline.precision)
+    quiet = [name for name, fit in posterior.fits.items() if fit.smallest is None]
+    for name in quiet:
+        untestable[name] = "no excitation: these records would not show it anywhere in its range"
+    return attribute(gram, candidates, tuple(untestable), baseline.precision) if quiet else posterior
+
+
+def ranked(posterior: Posterior) -> list[tuple[str, float]]:
+    """Effects, the most probable first."""
+    return sorted(posterior.effects.items(), key=lambda item: -item[1])
+
+
+def judge(posterior: Posterior) -> tuple[str, list[dict[str, Any]]]:
+    """Verdict, and every hypothesis with its probability, the most probable first."""
+    found: list[dict[str, Any]] = [
+        {"effects": [], "unknown": False, "probability": posterior.none},
+        {"effects": [], "unknown": True, "probability": posterior.unknown},
+        *({"effects": [name], "unknown": False, "probability": p} for name, p in posterior.effects.items()),
+    ]
+    verdict = "no_gap" if posterior.none >= 0.5 else "unknown" if posterior.unknown >= 0.5 else "explained"
+    return verdict, sorted(found, key=lambda h: -h["probability"])
+
+
+def credible(probabilities: Sequence[float], level: float = 0.95) -> list[int]:
+    """Indices of the fewest hypotheses that hold `level` of the probability (they come sorted)."""
+    count = int(np.searchsorted(np.cumsum(probabilities), level - 1e-12)) + 1
+    return list(range(min(count, len(probabilities))))
+
+
+def values_of(name: str, posterior: Posterior) -> dict[str, float]:
+    """Fitted parameters of an effect."""
+    fit = posterior.fits[name]
+    return {**fit.family.effect.neutral(), fit.family.parameter.name: fit.estimate}
+
+
+def remedy(verdict: str, posterior: Posterior) -> Callable[[NDArray], NDArray]:
+    """What the diagnosis changes in the model: its first effect where it explains, else nothing."""
+    if verdict != "explained":
+        return lambda parameters: parameters
+    name = ranked(posterior)[0][0]
+    return lambda parameters: effects.with_effects(parameters, {name: values_of(name, posterior)})
+
+
+def describe(name: str, posterior: Posterior) -> dict[str, Any]:
+    """One effect's entry."""
+    fit = posterior.fits[name]
+    effect, parameter = fit.family.effect, fit.family.parameter
+    shown = {p.name: {"estimate": p.neutral, "low95": p.neutral, "high95": p.neutral, "unit": p.unit}
+             for p in effect.parameters}
+    shown[parameter.name] = {"estimate": fit.estimate, "low95": fit.low95, "high95": fit.high95, "unit": parameter.unit}
+    return {"name": name, "probability": posterior.effects[name], "enters_at": list(effect.enters_at),
+            "scope": "shared", "history": None, "parameters": shown,
+            "indistinguishable_from": list(posterior.classes[name])}
+
+
+def detection_limits(posterior: Posterior) -> dict[str, dict[str, Any]]:
+    """Smallest size of every tested effect that would have stood out (whitened distance 3.5 from none)."""
+    return {name: {"parameter": fit.family.parameter.name, "smallest": fit.smallest, "unit": fit.family.parameter.unit}
+            for name, fit in posterior.fits.items()}
+
+
+def _next(flight: Reconstruction, candidates: Bank, posterior: Posterior, hypotheses: list[dict[str, Any]],
+          sigma: float) -> dict[str, Any] | None:
+    inside = [hypotheses[i] for i in credible([h["probability"] for h in hypotheses])]
+    names = [h["effects"][0] for h in inside if h["effects"]]
+    if len(names) == 1:
+        names += [n for n in posterior.classes[names[0]] if n not in names]
+    rivals = {n: values_of(n, posterior) for n in names}
+    return next_manoeuvre(flight, candidates, rivals, {n: max(posterior.effects[n], 1e-3) for n in names}, sigma)
+
+
+def resimulation(verdict: str, posterior: Posterior, training: gap.Energy, flights: Sequence[Reconstruction],
+                 evidences: Sequence[Evidence]) -> dict[str, Any]:
+    """What to fly to see the diagnosis for oneself."""
+    command, covariance = "icing fly clear_air", None
+    if verdict == "explained":
+        name = ranked(posterior)[0][0]
+        fit = posterior.fits[name]
+        command += f" --effect {name}:" + ",".join(f"{k}={v:.6g}" for k, v in values_of(name, posterior).items())
+        covariance = [[((fit.high95 - fit.low95) / 3.92) ** 2]]
+    starts, at = [], 0
+    for flight in flights:
+        starts.append(training.starts[at])
+        at += len(cut(flight).first)
+    records = [{"initial_state": dict(zip(FREE, (float(v) for v in start), strict=True)),
+                "wind": {"sigma_w": evidence.sigma_w}, "biases": {}}
+               for start, evidence in zip(starts, evidences, strict=True)]
+    return {"command": command, "records": records, "parameter_covariance": covariance}
+
+
+def _slow(problem: DataProblem, record: FlightRecord) -> bool:
+    """Whether samples are "missing" only because the channel runs at a lower, regular rate: no problem at all."""
+    if not problem.kind.endswith("samples missing, interpolated") or problem.channel not in record.channels:
+        return False
+    steps = np.diff(record.time[np.isfinite(record[problem.channel])])
+    return len(steps) > 0 and float(np.ptp(steps)) < 0.5 * record.dt
+
+
+def _problem(problem: DataProblem) -> dict[str, Any]:
+    return {"channel": problem.channel, "kind": problem.kind, "from": problem.start, "to": problem.end,
+            "repaired": problem.repaired}
+
+
+def provenance(flights: Sequence[Reconstruction], others: Sequence[Reconstruction], evidences: Sequence[Evidence],
+               without: tuple[str, ...], references: int, seed: int) -> dict[str, Any]:
+    """What the answer was made from."""
+    return {
+        "records": [{"sha256": content_hash(f.record), "samples": len(f.time), "rate_hz": 1.0 / f.dt,
+                     "sigma_w": e.sigma_w, "notes": list(f.notes)} for f, e in zip(flights, evidences, strict=True)],
+        "held_out": [{"sha256": content_hash(f.record), "samples": len(f.time), "notes": list(f.notes)}
+                     for f in others],
+        "references": references, "without": list(without), "library": len(effects.LIBRARY),
+        "sources": source_hash(), "seed": seed,
+        "assumptions": {"prior_no_gap": P_NONE, "prior_unknown": P_UNKNOWN, "baseline_spread": SPREAD},
+    }
+
+
+def content_hash(record: FlightRecord) -> str:
+    """Hash of the channels, whatever the file was called."""
+    digest = hashlib.sha256()
+    for name in sorted(record.channels):
+        digest.update(name.encode())
+        digest.update(np.ascontiguousarray(record.channels[name]).tobytes())
+    return digest.hexdigest()

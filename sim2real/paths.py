@@ -1,0 +1,89 @@
+"""Effects between a command and what it moves: actuators and the engines' spool, judged on commands alone.
+
+A recorded position does not care how the aircraft flies; so these effects are compared outside the flight model:
+first-order lag, rate limit, gearing and rigging of `icing_env.actuators` from recorded command to recorded position,
+and lever to shaft power through the spool lag of `icing_env.propulsion`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icing_env.atmosphere import pressure
+from icing_env.propulsion import power_available
+from icing_env.record import FloatArray
+from sim2real.channels import SURFACES
+from sim2real.reconstruct import Reconstruction
+
+POSITION_NOISE = 5.2e-4  # rad, the least believed (0.03 deg)
+POWER_NOISE = 0.01  # of full power
+
+
+def path_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple[str, FloatArray]]:
+    """For every path with a recorded command: its name and (measured - predicted)/noise [N, rows]."""
+    out = []
+    for surface in SURFACES:
+        name = f"{surface}_command"
+        if name in flight.commands and np.ptp(flight.commands[name]) > 1e-4:
+            predicted = follow(flight.commands[name], flight.positions[surface][0], parameters, surface, flight.dt)
+            measured = flight.positions[surface]
+            noise = max(POSITION_NOISE, _spread(measured))
+            out.append((f"{surface}_path", (measured[:, None] - predicted) / noise))
+    return out + _engine_residuals(flight, parameters)
+
+
+def follow(command: FloatArray, start: float, p: NDArray, surface: str, dt: float) -> FloatArray:
+    """Position [N, rows] of a surface behind its actuator and the recording's low pass.
+
+    The command of sample k acts during the step that ends there.
+    """
+    n = len(p)
+    position, out = np.full(n, start), np.empty((len(command), n))
+    lag, rate = p[f"{surface}_lag"], p[f"{surface}_rate"]
+    low, high = p[f"{surface}_min"], p[f"{surface}_max"]
+    gear, offset = p[f"{surface}_gearing"], p[f"{surface}_offset"]
+    cut = 1.0 - np.exp(-2.0 * np.pi * p["filter_frequency"] * dt)
+    share = 1.0 - np.exp(-dt / np.maximum(lag, 1e-3))
+    filtered = position.copy()
+    out[0] = filtered
+    for k in range(1, len(command)):
+        target = np.clip(gear * command[k] + offset, low, high)
+        position = position + np.clip((target - position) * share, -rate * dt, rate * dt)
+        filtered = filtered + cut * (position - filtered)
+        out[k] = filtered
+    return out
+
+
+def _engine_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple[str, FloatArray]]:
+    if flight.power_from != "torque":
+        return []
+    out = []
+    row: Any = flight.parameters[0]
+    full = np.array([power_available(pressure(float(h)), row) for h in flight.altitude])
+    share = 1.0 - np.exp(-flight.dt / parameters["spool_time"])
+    for side in ("left", "right"):
+        lever = flight.commands.get(f"throttle_{side}")
+        if lever is None or np.ptp(lever) < 1e-3:
+            continue
+        power = np.full(len(parameters), flight.controls[f"power_{side}"][0])
+        found = np.empty((len(lever), len(parameters)))
+        found[0] = power
+        for k in range(1, len(lever)):
+            power = power + share * (full[k] * min(max(lever[k], 0.0), 1.0) - power)
+            found[k] = power
+        left = (flight.controls[f"power_{side}"][:, None] - found) / full[:, None]
+        # the chart between lever and power is nobody's claim: a constant share and an offset are taken out
+        out.append((f"engine_{side}", _without_line(left, lever) / POWER_NOISE))
+    return out
+
+
+def _without_line(left: FloatArray, lever: FloatArray) -> FloatArray:
+    base = np.column_stack([np.ones(len(lever)), lever])
+    return left - base @ np.linalg.lstsq(base, left, rcond=None)[0]
+
+
+def _spread(values: FloatArray) -> float:
+    return 1.4826 * float(np.median(np.abs(np.diff(values, 3)))) / np.sqrt(20.0)

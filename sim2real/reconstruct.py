@@ -1,0 +1,218 @@
+"""A flight record as what a simulation needs: time steps, controls, air, start, and measurements to compare with.
+
+Surfaces are the recorded positions. Power comes from torque where recorded, else from thrust through the propeller
+chart, else from the levers, else it is the constant that balances the axial acceleration of the first second. Every
+choice that had to be made is kept in `notes`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.data_checks import check
+from estimators.resample import common_grid
+from icing_env import aircraft
+from icing_env.atmosphere import density, pressure, static_air
+from icing_env.errors import InputError
+from icing_env.propulsion import power_available
+from icing_env.record import FlightRecord, FloatArray
+from sim2real.channels import MEASURED, NOISE_FLOOR, SURFACES
+
+LONGEST_STEP, SHORTEST_STEP = 0.1, 0.018  # s: records are 10 to 200 Hz; faster ones are thinned to about 50 Hz
+LONGITUDINAL = ("airspeed", "alpha", "q", "theta", "ax", "az", "elevator")
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """One record on the simulation's steps; N samples.
+
+    Attributes:
+        name: of the record, for people only.
+        time, dt: s.
+        measured: [N, channels of MEASURED], nan where not sampled.
+        controls: positions of SURFACES and flap [rad], powers left and right [W], by name, each (N,); the recording's
+            low pass is undone, since the simulated instruments apply it again.
+        positions: the surfaces as recorded.
+        commands: surface commands [rad] and levers by name where recorded.
+        parameters: one PARAMETERS row with the mass, inertia and air of this record.
+        altitude: m, each sample (constant where not recorded).
+        power_from: "torque", "thrust", "throttle" or "balance".
+        noise: standard deviation per channel of MEASURED, from the record's own high frequencies.
+        notes: what was assumed.
+    """
+
+    name: str
+    record: FlightRecord
+    time: FloatArray
+    dt: float
+    measured: FloatArray
+    controls: dict[str, FloatArray]
+    positions: dict[str, FloatArray]
+    commands: dict[str, FloatArray]
+    parameters: NDArray
+    altitude: FloatArray
+    power_from: str
+    noise: FloatArray
+    notes: tuple[str, ...]
+
+    def channel(self, name: str) -> FloatArray:
+        """One column of `measured`, gaps filled by interpolation; zeros where it was not recorded."""
+        values = self.measured[:, MEASURED.index(name)]
+        good = np.isfinite(values)
+        if not good.any():
+            return np.zeros(len(values))
+        return np.interp(self.time, self.time[good], values[good])
+
+    def has(self, name: str) -> bool:
+        """Whether the channel was recorded."""
+        return bool(np.isfinite(self.measured[:, MEASURED.index(name)]).any())
+
+
+def reconstruct(record: FlightRecord, base: NDArray | None = None) -> Reconstruction:
+    """Check a record and bring it onto simulation steps.
+
+    Args:
+        record: as read from its file.
+        base: PARAMETERS row of the model; the published Twin Otter if omitted.
+
+    Raises:
+        InputError: the record is wrong or lacks what a longitudinal diagnosis needs.
+    """
+    record = check(record)
+    grid = common_grid(record)
+    values, time = dict(grid.values), grid.time - grid.time[0]
+    lacking = [n for n in LONGITUDINAL if n not in values]
+    if lacking:
+        raise InputError(f"record '{record.meta.name}' lacks {', '.join(lacking)}: a diagnosis needs "
+                         f"time, {', '.join(LONGITUDINAL)}")
+    if grid.dt > LONGEST_STEP * 1.01:
+        raise InputError(f"record '{record.meta.name}' has {1/grid.dt:.3g} samples/s; at least 10 are needed")
+    every = max(1, round(0.02 / grid.dt)) if grid.dt < SHORTEST_STEP else 1
+    notes: list[str] = []
+    if every > 1:
+        notes.append(f"thinned from {1/grid.dt:.0f} to {1/(grid.dt*every):.0f} samples/s")
+    time, dt = time[::every], grid.dt * every
+    values = {n: v[::every] for n, v in values.items()}
+    measured = _measured(record, grid.time[::every], values, dt)
+    row = _airframe(record, aircraft.load() if base is None else base.copy(), values, notes)
+    altitude = _air(row, values, notes)
+    positions = {n: values[n] if n in values else np.zeros(len(time)) for n in SURFACES}
+    controls = {n: unfiltered(v, float(row["filter_frequency"][0]), dt) for n, v in positions.items()}
+    controls["flap"] = values.get("flap", np.zeros(len(time)))
+    notes.extend(f"{n} not recorded: taken as zero" for n in SURFACES if n not in values)
+    source, powers = _powers(row, values, altitude, notes)
+    controls |= powers
+    names = [*(f"{s}_command" for s in SURFACES), "throttle_left", "throttle_right"]
+    commands = {n: values[n] for n in names if n in values}
+    for name in MEASURED[-2:]:
+        if source != "torque":
+            measured[:, MEASURED.index(name)] = np.nan  # it drives the simulation: nothing is left to compare
+    return Reconstruction(record.meta.name, record, time, dt, measured, controls, positions, commands, row, altitude,
+                          source, _noise(measured), tuple(notes))
+
+
+def _measured(record: FlightRecord, time: FloatArray, values: dict[str, FloatArray], dt: float) -> FloatArray:
+    """Samples at the steps; channels slower than the steps stay blank between their samples."""
+    out = np.full((len(time), len(MEASURED)), np.nan)
+    for j, name in enumerate(MEASURED):
+        if name not in values:
+            continue
+        valid = np.isfinite(record[name]) if name in record.channels else np.zeros(len(record), bool)
+        at = record.time[valid]
+        near = np.zeros(len(time), dtype=bool)
+        index = np.clip(np.searchsorted(time, at - 0.5 * dt), 0, len(time) - 1)
+        near[index] = True
+        out[near, j] = values[name][near]
+    return out
+
+
+def _airframe(record: FlightRecord, row: NDArray, values: dict[str, FloatArray], notes: list[str]) -> NDArray:
+    """Mass, inertia and geometry of the record where it states them."""
+    meta = record.meta
+    mass = float(np.mean(values["mass"])) if "mass" in values else meta.mass
+    if mass:
+        row["mass"] = mass
+    else:
+        notes.append(f"mass not stated: {row['mass'][0]:.0f} kg from the aircraft file")
+    if meta.inertia:
+        for axis, value in zip(("xx", "yy", "zz", "xz"), meta.inertia, strict=True):
+            row[f"inertia_{axis}"] = value
+    else:
+        notes.append("inertia not stated: from the aircraft file")
+    if meta.geometry:
+        row["wing_area"], row["span"], row["chord"] = (
+            meta.geometry.wing_area, meta.geometry.span, meta.geometry.chord)
+    return row
+
+
+def _air(row: NDArray, values: dict[str, FloatArray], notes: list[str]) -> FloatArray:
+    """Altitude of each sample, with a temperature offset in `row` so that the density is the record's."""
+    n = len(values["airspeed"])
+    if "altitude" in values:
+        altitude = values["altitude"].copy()
+        if "temperature" in values:
+            standard = static_air(float(np.median(altitude)))[0]
+            row["temperature_offset"] = float(np.median(values["temperature"])) - standard
+        return altitude
+    if "density" in values or "qbar" in values:
+        rho = np.median(values.get("density", 2.0 * values.get("qbar", 0.0) / values["airspeed"] ** 2))
+        heights = np.linspace(0.0, 9000.0, 901)
+        found = float(np.interp(-rho, [-density(float(h)) for h in heights], heights))
+        notes.append(f"altitude not recorded: {found:.0f} m, where the standard atmosphere has the record's density")
+        return np.full(n, found)
+    notes.append("altitude and density not recorded: 2200 m assumed")
+    return np.full(n, 2200.0)
+
+
+def _powers(row: NDArray, values: dict[str, FloatArray], altitude: FloatArray,
+            notes: list[str]) -> tuple[str, dict[str, FloatArray]]:
+    """Shaft powers [W] that drive the engines, and where they come from."""
+    p = row[0]
+    forward = values["airspeed"] * np.cos(values["alpha"])
+    per_power = p["propeller_efficiency"] / np.sqrt(forward**2 + p["propeller_static_speed"] ** 2)
+    sides = ("left", "right")
+    if all(f"torque_{s}" in values for s in sides):
+        rpm = {s: values.get(f"rpm_{s}", np.full(len(altitude), p["propeller_rpm"])) for s in sides}
+        return "torque", {f"power_{s}": values[f"torque_{s}"] * rpm[s] * math.pi / 30.0 for s in sides}
+    if all(f"thrust_{s}" in values for s in sides):
+        notes.append("torque not recorded: power from the recorded thrust")
+        return "thrust", {f"power_{s}": values[f"thrust_{s}"] / per_power for s in sides}
+    if all(f"throttle_{s}" in values for s in sides):
+        notes.append("thrust and torque not recorded: power from the levers")
+        full = np.array([power_available(pressure(float(h)), p) for h in altitude])
+        return "throttle", {f"power_{s}": full * values[f"throttle_{s}"] for s in sides}
+    notes.append("thrust not recorded: the constant that balances the axial acceleration at the start")
+    first = slice(0, max(2, len(altitude) // 20))
+    qs = 0.5 * density(float(np.median(altitude))) * np.mean(values["airspeed"][first] ** 2) * p["wing_area"]
+    a = float(np.mean(values["alpha"][first]))
+    drag = -qs * (p["CX_0"] + p["CX_alpha"] * a + p["CX_alpha2"] * a * a)
+    thrust = max(p["mass"] * float(np.mean(values["ax"][first])) + drag, 0.0)
+    return "balance", {f"power_{s}": np.full(len(altitude), 0.5 * thrust / np.mean(per_power)) for s in sides}
+
+
+def unfiltered(values: FloatArray, frequency: float, dt: float) -> FloatArray:
+    """Undo the first-order low pass of the recording (icing_env.sensors): noise grows by half."""
+    share = 1.0 - math.exp(-2.0 * math.pi * frequency * dt)
+    out = values.copy()
+    out[1:] = (values[1:] - (1.0 - share) * values[:-1]) / share
+    return out
+
+
+def _noise(measured: FloatArray) -> FloatArray:
+    """Noise of each channel from its third differences (their variance is 20 times that of white noise), robustly."""
+    out = np.array([NOISE_FLOOR[name] for name in MEASURED])
+    for j in range(measured.shape[1]):
+        samples = measured[np.isfinite(measured[:, j]), j]
+        if len(samples) > 20:
+            spread = 1.4826 * float(np.median(np.abs(np.diff(samples, 3)))) / math.sqrt(20.0)
+            out[j] = max(out[j], spread)
+    return out
+
+
+def with_parameters(flight: Reconstruction, row: NDArray) -> Reconstruction:
+    """The same record over another model, its own mass, inertia and air kept."""
+    return replace(flight, parameters=row)

@@ -1,0 +1,80 @@
+"""Where a gap lies: by component, by flight regime, and in what terms when nothing in the library explains it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.special import logsumexp
+
+from sim2real.attribution import Posterior
+from sim2real.candidates import DEVIATION, GENERIC, GENERIC_SIZE
+from sim2real.channels import TOLERANCE
+from sim2real.evidence import Evidence
+
+REGIME_VARIABLES = ("alpha", "airspeed", "beta", "q", "p")
+BINS = 4
+SHOWN = 4.0  # standard deviations of the mean whitened energy of a bin above one
+TARGETS = {component: target for component, target, _ in GENERIC}
+
+
+def components(posterior: Posterior) -> dict[str, float]:
+    """Probability that the gap enters at each component, those above one in a thousand."""
+    out: dict[str, float] = {}
+    for name, p in posterior.effects.items():
+        for component in posterior.fits[name].family.effect.enters_at:
+            out[component] = out.get(component, 0.0) + p
+    logs = np.array([fit.log_evidence for fit in posterior.unknown_fits])
+    for fit, share in zip(posterior.unknown_fits, np.exp(logs - logsumexp(logs)), strict=True):
+        out[fit.component] = out.get(fit.component, 0.0) + posterior.unknown * float(share)
+    return {k: min(v, 1.0) for k, v in sorted(out.items(), key=lambda item: -item[1]) if v > 1e-3}
+
+
+def regimes(evidences: Sequence[Evidence]) -> list[dict[str, Any]]:
+    """Stretches of alpha, speed, sideslip and rates in which the innovations are larger than noise and gusts are.
+
+    `excess`: mean whitened square less one; only those beyond SHOWN standard deviations (2/n each) are listed.
+    """
+    out = []
+    white = np.concatenate([e.whitened for e in evidences])
+    for name in REGIME_VARIABLES:
+        values = np.concatenate([e.flight.channel(name)[1 : len(e.whitened) + 1] for e in evidences])
+        edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)))
+        for low, high in zip(edges[:-1], edges[1:], strict=True):
+            inside = white[(values >= low) & (values <= high)]
+            inside = inside[inside != 0.0]
+            if len(inside) < 100:
+                continue
+            excess = float(np.mean(inside**2) - 1.0)
+            if excess > SHOWN * np.sqrt(2.0 / len(inside)):
+                out.append({"variable": name, "low": float(low), "high": float(high), "excess": excess})
+    return sorted(out, key=lambda r: -r["excess"])
+
+
+def describe_unknown(posterior: Posterior) -> dict[str, Any] | None:
+    """Component, terms and kind of what the library lacks; None where that is improbable."""
+    if posterior.unknown < 0.05 or not posterior.unknown_fits:
+        return None
+    fit = max(posterior.unknown_fits, key=lambda u: u.log_evidence)
+    target = TARGETS[fit.component]
+    terms: list[dict[str, Any]] = []
+    for name, value, error in fit.terms:
+        size = _size(name, target, fit.component.startswith("sensor:"))
+        terms.append({"term": name, "coefficient": value * size, "std_error": error * size, "z": abs(value / error)})
+    terms.sort(key=lambda t: -t["z"])
+    leading = terms[0]["term"]
+    kind = "time_varying" if leading == "time" else "dynamic" if leading.endswith("_dot") else "static"
+    kept = [t for t in terms if t["z"] > 2.0] or terms[:1]
+    return {"component": fit.component, "kind": kind,
+            "terms": [{k: t[k] for k in ("term", "coefficient", "std_error")} for t in kept]}
+
+
+def _size(name: str, target: str, sensor: bool) -> float:
+    """A term's coefficient in the record's units: coefficient of force or moment per regressor, or of the channel."""
+    if sensor:
+        return TOLERANCE[target] if name in ("1", "time") else 0.1
+    size = GENERIC_SIZE[target]
+    for factor in name.split("*"):
+        size /= DEVIATION.get(factor, 1.0)
+    return size

@@ -1,0 +1,52 @@
+"""A diagnosis in three plain sentences."""
+
+from __future__ import annotations
+
+from sim2real.diagnosis import Diagnosis
+
+
+def sentences(found: Diagnosis) -> list[str]:
+    """What is found, how far the gap closes, what to do next."""
+    return [_finding(found), _closing(found), _next(found)]
+
+
+def _finding(found: Diagnosis) -> str:
+    first = found.hypotheses[0]
+    sure = f"probability {first['probability']:.2f}"
+    if found.verdict == "no_gap":
+        return f"The records show no gap beyond the model's own uncertainty ({sure})."
+    if found.verdict == "unknown":
+        where = found.unknown["component"] if found.unknown else "nowhere in particular"
+        return f"There is a gap that nothing in the library explains; it enters at {where} ({sure})."
+    if not first["effects"]:
+        return "There is a gap, but no single explanation stands out."
+    effect = next(e for e in found.effects if e["name"] == first["effects"][0])
+    size = ", ".join(f"{k} {p['estimate']:.3g} {'' if p['unit'] == '1' else p['unit']}".rstrip()
+                     for k, p in effect["parameters"].items() if p["low95"] != p["high95"])  # fmt: skip
+    told = effect["indistinguishable_from"]
+    other = f", which these records cannot tell from {', '.join(told)}" if told else ""
+    return f"The gap is best explained by {effect['name']} ({size}; {sure}){other}."
+
+
+def _closing(found: Diagnosis) -> str:
+    held = found.gap["held_out"]
+    training = found.gap["training"]
+    if held["before"] is None:
+        return (f"On the diagnosed records the gap goes from {training['before']:.2f} to {training['after']:.2f} "
+                "tolerances; no held-out record was given, so how far it closes is not measured.")
+    if held["closure"] is None:
+        return (f"On the held-out records the gap is {held['before']:.2f} tolerances, "
+                "no more than noise and gusts alone may give, so there is nothing to close.")
+    return (f"On the held-out records the gap goes from {held['before']:.2f} to {held['after']:.2f} tolerances: "
+            f"{100 * held['closure']:.0f} % closed; the worst channel is {held['worst_channel']}.")
+
+
+def _next(found: Diagnosis) -> str:
+    if found.next_manoeuvre is not None:
+        pairs = "; ".join(f"{a} from {b}" for a, b in found.next_manoeuvre["separates"][:3])
+        return f"Fly {found.next_manoeuvre['name']} next: it separates {pairs}."
+    if found.verdict == "no_gap":
+        shown = sum(1 for limit in found.detection_limits.values() if limit["smallest"] is not None)
+        missed = len(found.not_testable)
+        return f"{shown} effects would have shown at their detection limits; {missed} could not be tested."
+    return "No further manoeuvre is needed to tell the explanations apart."

@@ -1,0 +1,105 @@
+"""`icing diagnose`: where a simulator and an aircraft part, which effect causes it, how far the gap closes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from testbed.commands.common import print_json, print_table, verb
+
+if TYPE_CHECKING:
+    from icing_env.record import FlightRecord
+    from sim2real.diagnosis import Diagnosis
+
+EXAMPLE = """icing fly clear_air --seed 1 --effect elevator_power:change=-0.2 --out flown.csv
+icing fly clear_air --seed 2 --effect elevator_power:change=-0.2 --out other.csv
+icing diagnose flown.csv --held-out other.csv --out out/diagnosis"""
+RECORDS = click.Path(path_type=Path)
+
+
+@verb("diagnose", EXAMPLE)
+@click.argument("records", nargs=-1, required=True, metavar="RECORD...", type=RECORDS)
+@click.option("--held-out", multiple=True, metavar="RECORD", type=RECORDS,
+              help="Never fitted: how far the gap closes is measured on it. May be repeated.")  # fmt: skip
+@click.option("--reference", multiple=True, metavar="RECORD", type=RECORDS,
+              help="The same aircraft without the gap: corrects the model first. May be repeated.")  # fmt: skip
+@click.option("--without", multiple=True, metavar="EFFECT", help="Leave an effect out of the library. May be repeated.")
+@click.option("--out", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
+              help="Write diagnosis.json and report.html there.")  # fmt: skip
+def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tuple[Path, ...],
+            without: tuple[str, ...], out: Path | None, as_json: bool, seed: int) -> None:
+    """Say where the model and the aircraft that flew RECORD part, and which unmodelled effect causes it.
+
+    Records are .csv, .parquet or SIDPAC's .mat. Every effect of `icing effects` is tried, beside "no gap" and "nothing
+    in the library"; effects that the records cannot tell apart are named together. Names and notes of files play no
+    part.
+    """
+    from rich.console import Console
+
+    from sim2real.diagnosis import diagnose
+
+    with Console(stderr=True).status("reading the records") as status:
+        found = diagnose(read_all(records), read_all(held_out), read_all(reference), without, seed, status.update)
+    result = answer(found)
+    if out is not None:
+        from testbed.diagnosis_report import write_report
+
+        write_report(found, result, out)
+    if as_json:
+        print_json(result)
+        return
+    show(found, result)
+    if out is not None:
+        click.echo(f"report: {out / 'report.html'}")
+
+
+def read_all(paths: tuple[Path, ...]) -> list[FlightRecord]:
+    """Records of the given files."""
+    from icing_env.record import read
+
+    return [read(path) for path in paths]
+
+
+def answer(found: Diagnosis) -> dict[str, Any]:
+    """The diagnosis as JSON fixes it."""
+    from dataclasses import fields
+
+    return {f.name: getattr(found, f.name) for f in fields(found) if f.metadata.get("json", True)}
+
+
+def show(found: Diagnosis, result: dict[str, Any]) -> None:
+    """The verdict in plain sentences, then the evidence as tables."""
+    from sim2real.words import sentences
+
+    for sentence in sentences(found):
+        click.echo(sentence)
+    headers = {"explanation": "left", "probability": "right", "parameter": "left", "estimate": "right",
+               "95 %": "left", "cannot be told from": "left"}  # fmt: skip
+    described = {e["name"]: e for e in result["effects"]}
+    rows = []
+    for i, hypothesis in enumerate(result["hypotheses"][:8]):
+        if hypothesis["probability"] < 1e-3 and i > 1:
+            break
+        name = hypothesis["effects"][0] if hypothesis["effects"] else (
+            "nothing in the library" if hypothesis["unknown"] else "no gap")
+        entry = described.get(name)
+        rows.append([name, f"{hypothesis['probability']:.3f}", *(_parameter(entry) if entry else ("", "", "", ""))])
+    click.echo()
+    print_table("Explanations", headers, rows)
+    click.echo()
+    channels = result["where"]["channels"]
+    print_table("Gap by channel, tolerances of 14 CFR Part 60", {"channel": "left", "before": "right"},
+                [[c, f"{v:.2f}"] for c, v in sorted(channels.items(), key=lambda item: -item[1])])
+    if result["not_testable"]:
+        click.echo()
+        click.echo("Not testable: " + "; ".join(f"{n['effect']} ({n['why']})" for n in result["not_testable"]))
+    for problem in result["data_problems"]:
+        click.echo(f"Record: {problem['channel']} {problem['kind']}")
+
+
+def _parameter(entry: dict[str, Any]) -> tuple[str, str, str, str]:
+    name, p = max(entry["parameters"].items(), key=lambda item: item[1]["high95"] - item[1]["low95"])
+    return (f"{name} [{p['unit']}]", f"{p['estimate']:.4g}", f"{p['low95']:.4g} .. {p['high95']:.4g}",
+            ", ".join(entry["indistinguishable_from"][:4]))

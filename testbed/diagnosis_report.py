@@ -1,0 +1,149 @@
+"""A diagnosis as files: `diagnosis.json` for machines and `report.html` for people."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from icing_env.record import FloatArray
+from sim2real import gap
+from sim2real.channels import TOLERANCE
+from sim2real.diagnosis import Diagnosis
+from sim2real.windows import COMPARED, cut, residuals
+from sim2real.words import sentences
+from testbed.commands.common import plain
+from testbed.plot_style import ROLES, styled
+from testbed.plotting import gap_bars, time_histories
+from testbed.report import Report
+
+KIND = {"no_gap": "good", "explained": "caution", "unknown": "bad"}
+OVERLAID = ("airspeed", "alpha", "q", "theta", "ax", "az", "beta", "p", "r", "phi", "ay")
+
+
+def write_report(found: Diagnosis, result: Mapping[str, Any], folder: Path) -> Path:
+    """Write both files into `folder` (made as needed); returns the report's path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(plain(result), indent=2, allow_nan=False, ensure_ascii=False)
+    (folder / "diagnosis.json").write_text(text + "\n", encoding="utf-8")
+    return build(found, result).write(folder / "report.html")
+
+
+def build(found: Diagnosis, result: Mapping[str, Any]) -> Report:
+    """The report: verdict, evidence, where, how far the gap closes, what could have been seen."""
+    report = Report("Diagnosis of a sim-to-real gap", sentences(found)[0],
+                    {"sources": str(found.provenance["sources"]), "seed": str(found.provenance["seed"])})
+    report.section("Verdict")
+    report.verdict(sentences(found)[0], KIND[found.verdict])
+    for sentence in sentences(found)[1:]:
+        report.text(sentence)
+    _explanations(report, result)
+    _where(report, found, result)
+    _closing(report, found)
+    _limits(report, result)
+    return report
+
+
+def _explanations(report: Report, result: Mapping[str, Any]) -> None:
+    report.section("Explanations")
+    shown = [h for h in result["hypotheses"] if h["probability"] >= 1e-3][:12] or result["hypotheses"][:1]
+    report.figure(_bars({_label(h): h["probability"] for h in reversed(shown)}, "probability"),
+                  "Probability of each explanation, given these records.")
+    rows: list[list[Any]] = []
+    for effect in result["effects"]:
+        for name, p in effect["parameters"].items():
+            rows.append([effect["name"], effect["probability"], name, p["estimate"], p["low95"], p["high95"], p["unit"],
+                         ", ".join(effect["indistinguishable_from"]) or None])
+    if rows:
+        report.table(["effect", "probability", "parameter", "estimate", "low 95 %", "high 95 %", "unit",
+                      "cannot be told from"], rows, "Effects that these records leave possible.")
+    if result["unknown"]:
+        unknown = result["unknown"]
+        report.table(["term", "coefficient", "standard error"],
+                     [[t["term"], t["coefficient"], t["std_error"]] for t in unknown["terms"]],
+                     f"What the library lacks, as terms of {unknown['component']} ({unknown['kind']}).")
+
+
+def _where(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:
+    report.section("Where the gap lies")
+    training = found.details.training
+    report.figure(gap_bars(gap.by_channel(training.before), gap.by_channel(training.after),
+                           gap.by_channel(training.alone.mean(axis=0))),
+                  "Free simulation of the diagnosed records in 10 s windows, before and after.")
+    if result["where"]["components"]:
+        report.table(["component", "probability that the gap enters there"],
+                     [[c, p] for c, p in result["where"]["components"].items()], "Where the gap enters.")
+    report.figure(_heat(training), "Residual by channel and window, in tolerances, before the diagnosis.")
+    if result["where"]["regimes"]:
+        report.table(["variable", "from", "to", "excess"],
+                     [[r["variable"], r["low"], r["high"], r["excess"]] for r in result["where"]["regimes"][:10]],
+                     "Regimes in which one-step predictions err by more than noise and gusts (mean square less one).")
+
+
+def _closing(report: Report, found: Diagnosis) -> None:
+    report.section("How far the gap closes")
+    flights = found.details.held_out or found.details.flights
+    what = "held-out" if found.details.held_out else "diagnosed"
+    if found.details.tested is not None:
+        report.figure(gap_bars(gap.by_channel(found.details.tested.before), gap.by_channel(found.details.tested.after),
+                               gap.by_channel(found.details.tested.alone.mean(axis=0))), "The held-out records.")
+    flight = flights[0]
+    windows = cut(flight)
+    series = {"record": {"time": flight.time, **{c: flight.channel(c) for c in COMPARED if flight.has(c)}}}
+    index = (windows.first[:, None] + 1 + np.arange(windows.length)).ravel()
+    for label, parameters in (("before", flight.parameters), ("after", found.details.change(flight.parameters))):
+        left = residuals(flight, parameters, windows)[0] * _tolerances()
+        flown = flight.measured[index, : len(COMPARED)] - left.reshape(-1, len(COMPARED))
+        series[label] = {"time": flight.time[index],
+                         **{c: flown[:, j] for j, c in enumerate(COMPARED) if flight.has(c) and c in OVERLAID}}
+    channels = [c for c in OVERLAID if flight.has(c)]
+    report.figure(time_histories(series, channels, {"record": "truth", "before": "iced", "after": "protected"}),
+                  f"The first {what} record and its free simulation, restarted every 10 s.")
+
+
+def _limits(report: Report, result: Mapping[str, Any]) -> None:
+    report.section("What these records could have shown",
+                   "The smallest size of each effect that would have stood 3.5 noise units away from no gap.")
+    limits = [[n, d["parameter"], d["smallest"], d["unit"]] for n, d in result["detection_limits"].items()]
+    report.table(["effect", "parameter", "smallest", "unit"], limits, "Detection limits.")
+    if result["not_testable"]:
+        report.table(["effect", "why"], [[n["effect"], n["why"]] for n in result["not_testable"]], "Not testable.")
+
+
+def _label(hypothesis: Mapping[str, Any]) -> str:
+    if hypothesis["effects"]:
+        return ", ".join(hypothesis["effects"])
+    return "nothing in the library" if hypothesis["unknown"] else "no gap"
+
+
+def _tolerances() -> FloatArray:
+    return np.array([TOLERANCE[c] for c in COMPARED])
+
+
+@styled
+def _bars(values: Mapping[str, float], label: str) -> Figure:
+    figure = Figure(figsize=(9.2, 0.9 + 0.32 * len(values)), layout="constrained")
+    axes = figure.subplots()
+    axes.barh(list(values), list(values.values()), 0.6, color=ROLES["estimate"]["color"])
+    axes.set_xlim(0.0, 1.0)
+    axes.set_xlabel(label)
+    axes.grid(False, axis="y")
+    return figure
+
+
+@styled
+def _heat(energy: gap.Energy) -> Figure:
+    shown = [j for j in range(len(COMPARED)) if np.isfinite(energy.before[:, j]).any()]
+    values = np.sqrt(energy.before[:, shown].T)
+    figure = Figure(figsize=(9.2, 1.0 + 0.3 * len(shown)), layout="constrained")
+    axes = figure.subplots()
+    image = axes.imshow(values, aspect="auto", cmap="viridis", vmin=0.0)
+    axes.set_yticks(range(len(shown)), [COMPARED[j] for j in shown])
+    axes.set_xlabel("window (10 s each)")
+    axes.grid(False)
+    figure.colorbar(image, ax=axes, label="tolerances")
+    return figure
