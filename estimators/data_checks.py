@@ -18,7 +18,7 @@ from estimators.differentiate import half_width, slope, smooth
 from estimators.resample import common_grid
 from icing_env.errors import InputError
 from icing_env.record import DataProblem, FlightRecord, FloatArray
-from icing_env.record_table import check_radians
+from icing_env.record.table import check_radians
 
 MOTION = ("alpha", "beta", "p", "q", "r", "phi", "theta", "ax", "ay", "az")
 SHORTEST, FEWEST = 1.0, 20  # s, samples

@@ -98,7 +98,7 @@ class TwinOtterEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _show(self) -> None:
         if self.render_mode == "human":
             if self._window is None:
-                from icing_env.window import Window
+                from icing_env.display.window import Window
 
                 self._window = Window("Twin Otter")
             self._window.show(self.world.frame(0))

@@ -1,9 +1,8 @@
 """The flight model a second time, from docs/model.md, docs/model_weather_ice.md section 8 and configs/ alone.
 
-Plain NumPy, nothing of ours imported, so that a slip in the compiled plant cannot repeat itself here. Section numbers
-are those of docs/model.md. Every function takes and returns floats or arrays of one shape (one entry per aircraft);
-records are namespaces with the documents' names: `x` continuous states, `s` held gusts and ice, `c` the aircraft of
-this step, `p` parameters, `u` command. SI and radians.
+Plain NumPy, nothing of ours imported, so that a slip in the compiled plant cannot repeat itself. Sections are those of
+docs/model.md. Functions take floats or arrays of one shape; records are namespaces with the documents' names: `x`
+continuous states, `s` held gusts and ice, `c` the aircraft now, `p` parameters, `u` command. SI and radians.
 """
 
 from __future__ import annotations

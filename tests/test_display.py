@@ -14,11 +14,11 @@ from PIL import Image
 
 from icing_env import types
 from icing_env.display import INSTRUMENTS, DisplayView, climb_rate, draw
-from icing_env.display_attitude import GROUND, HAZE, SKY
-from icing_env.display_panels import envelope_cue
-from icing_env.display_pen import AMBER, GREEN, PAGE, RED, Pen, mix
+from icing_env.display.attitude import GROUND, HAZE, SKY
+from icing_env.display.panels import envelope_cue
+from icing_env.display.pen import AMBER, GREEN, PAGE, RED, Pen, mix
+from icing_env.display.window import Window
 from icing_env.errors import InputError
-from icing_env.window import Window
 
 SMALL = (320, 240)
 FLYING = DisplayView(

@@ -64,7 +64,8 @@ def test_writing_fails_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     path = tmp_path / "r.csv"
     write(longitudinal(), path)
     before = path.read_bytes()
-    monkeypatch.setattr("icing_env.record_csv.csv.writer", lambda *a, **k: (_ for _ in ()).throw(OSError("disk full")))
+    full = lambda *a, **k: (_ for _ in ()).throw(OSError("disk full"))  # noqa: E731
+    monkeypatch.setattr("icing_env.record.csv_file.csv.writer", full)
     with pytest.raises(OSError, match="disk full"):
         write(longitudinal(), path)
     assert path.read_bytes() == before and sorted(p.name for p in tmp_path.iterdir()) == ["r.csv", "r.toml"]

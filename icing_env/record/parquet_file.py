@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from icing_env.errors import InputError
-from icing_env.record import FlightRecord
-from icing_env.record_table import check_header, record_from_table, table_of, write_whole
+from icing_env.record.flight import FlightRecord
+from icing_env.record.table import check_header, record_from_table, table_of, write_whole
 
 
 def _pyarrow() -> tuple[Any, Any]:

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.io import loadmat
 
 from icing_env.errors import InputError
-from icing_env.record import FlightRecord, FloatArray, Geometry, RecordMeta
+from icing_env.record.flight import FlightRecord, FloatArray, Geometry, RecordMeta
 
 FT, LBF, SLUG = 0.3048, 4.4482216152605, 14.593902937206  # m, N, kg (exact definitions of the foot and the pound)
 G = 32.174 * FT  # m/s2, the value that SIDPAC's definitions use

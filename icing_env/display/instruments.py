@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from icing_env.display_pen import (
+from icing_env.display.pen import (
     AMBER,
     BACK,
     BLACK,
@@ -31,7 +31,7 @@ from icing_env.display_pen import (
 )
 
 if TYPE_CHECKING:
-    from icing_env.display import DisplayView
+    from icing_env.display.view import DisplayView
 
 KNOT = 0.514444  # m/s
 FOOT = 0.3048  # m

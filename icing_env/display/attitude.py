@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from icing_env.display_pen import AMBER, BLACK, EDGE, INK, RED, YELLOW, Box, Colour, Pen, Point, clamp, mix, polar
+from icing_env.display.pen import AMBER, BLACK, EDGE, INK, RED, YELLOW, Box, Colour, Pen, Point, clamp, mix, polar
 
 if TYPE_CHECKING:
-    from icing_env.display import DisplayView
+    from icing_env.display.view import DisplayView
 
 Place = Callable[[float, float], Point]
 SKY: Colour = (22, 104, 178)

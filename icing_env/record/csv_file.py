@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from icing_env.errors import InputError
-from icing_env.record import FlightRecord, FloatArray
-from icing_env.record_table import check_header, record_from_table, table_of, write_whole
+from icing_env.record.flight import FlightRecord, FloatArray
+from icing_env.record.table import check_header, record_from_table, table_of, write_whole
 
 
 def read_csv(path: Path) -> FlightRecord:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from icing_env.display_instruments import KNOT
-from icing_env.display_pen import (
+from icing_env.display.instruments import KNOT
+from icing_env.display.pen import (
     AMBER,
     BLACK,
     CYAN,
@@ -26,7 +26,7 @@ from icing_env.display_pen import (
 )
 
 if TYPE_CHECKING:
-    from icing_env.display import DisplayView
+    from icing_env.display.view import DisplayView
 
 STATUS: Box = (16, 14, 690, 50)
 ICE: Box = (704, 14, 944, 706)

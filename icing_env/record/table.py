@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from icing_env.errors import InputError, nearest
-from icing_env.record import COLUMNS, OWNER_COLUMNS, ROLES, FlightRecord, FloatArray, Geometry, RecordMeta
+from icing_env.record.flight import COLUMNS, OWNER_COLUMNS, ROLES, FlightRecord, FloatArray, Geometry, RecordMeta
 
 # Largest magnitude (rad) that a column in radians can reach; beyond it the column is in degrees.
 RADIAN_LIMITS = {

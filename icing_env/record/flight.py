@@ -1,4 +1,4 @@
-"""One type for simulated and recorded flight, and the way in and out of files.
+"""One type for simulated and recorded flight.
 
 Channels carry the column names, units and signs of the flight-record interface: SI, radians, body axes x forward,
 y right, z down. A sample that was not taken is nan, so that channels may run at different rates. What the owner of
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -151,48 +150,3 @@ class FlightRecord:
     def with_problems(self, problems: Iterable[DataProblem]) -> FlightRecord:
         """The same record with more problems known."""
         return replace(self, problems=(*self.problems, *problems))
-
-
-def without_empty_thrust(record: FlightRecord) -> FlightRecord:
-    """A column of zeros for thrust means that thrust was not recorded: drop it and say so (interface, section 2)."""
-    zero = [n for n in ("thrust_left", "thrust_right") if n in record.channels and not np.nan_to_num(record[n]).any()]
-    if not zero or len(record) == 0:
-        return record
-    span = float(record.time[0]), float(record.time[-1])
-    found = [DataProblem(name, "zeros, taken as absent", *span, True) for name in zero]
-    kept = {n: v for n, v in record.channels.items() if n not in zero}
-    return replace(record, channels=kept).with_problems(found)
-
-
-def read(path: str | Path) -> FlightRecord:
-    """Read a flight record: `.csv`, `.parquet` (each with an optional `.toml` beside it) or SIDPAC's `.mat`.
-
-    Raises:
-        InputError: in one line, what is wrong with the file, where, and what would be right.
-    """
-    from icing_env import record_csv, record_parquet, sidpac
-
-    path = Path(path)
-    readers = {".csv": record_csv.read_csv, ".parquet": record_parquet.read_parquet, ".mat": sidpac.read_mat}
-    if path.suffix.lower() not in readers:
-        raise InputError(f"{path}: '{path.suffix}' is no flight record; valid are: {', '.join(readers)}")
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file")
-    return without_empty_thrust(readers[path.suffix.lower()](path))
-
-
-def write(record: FlightRecord, path: str | Path) -> None:
-    """Write `record` to `.csv` or `.parquet`, with what `meta` knows in a `.toml` beside it; whole or not at all.
-
-    Of the owner's columns only angular accelerations have a place in the file; the rest is not written.
-
-    Raises:
-        InputError: for another suffix.
-    """
-    from icing_env import record_csv, record_parquet
-
-    path = Path(path)
-    writers = {".csv": record_csv.write_csv, ".parquet": record_parquet.write_parquet}
-    if path.suffix.lower() not in writers:
-        raise InputError(f"{path}: cannot write '{path.suffix}'; valid are: {', '.join(writers)}")
-    writers[path.suffix.lower()](record, path)
