@@ -10,10 +10,10 @@ import pytest
 
 from icing_env import scenario
 from icing_env.errors import InputError
-from testbed import metrics, suite
-from testbed.compare import compare
+from testbed.comparison import metrics, suite
+from testbed.comparison.compare import compare
+from testbed.comparison.trace import INTERVAL, SAMPLES, Trace, trace
 from testbed.flight import CONTROLLERS, make_world
-from testbed.trace import INTERVAL, SAMPLES, Trace, trace
 
 N = 1201  # two minutes
 TIME = np.arange(N)*INTERVAL

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from icing_env.errors import InputError
-from testbed import reproduce_flight, reproduce_table1, reproduce_textbook
-from testbed.doublet_windows import Window
-from testbed.reproduce import ITEMS, reproduce
-from testbed.reproduce_row import Row, Rule, row
+from testbed.reproduce import flight as reproduce_flight
+from testbed.reproduce import table1 as reproduce_table1
+from testbed.reproduce import textbook as reproduce_textbook
+from testbed.reproduce.items import ITEMS, reproduce
+from testbed.reproduce.row import Row, Rule, row
+from testbed.reproduce.windows import Window
 
 
 def test_rules_say_what_they_do():
@@ -124,5 +126,5 @@ def test_every_item_has_its_module_and_rows_are_plain():
     from importlib import import_module
 
     for module, what in ITEMS.values():
-        assert callable(import_module(f"testbed.reproduce_{module}").rows) and what
+        assert callable(import_module(f"testbed.reproduce.{module}").rows) and what
     assert dataclasses.is_dataclass(Row) and reproduce_table1.ITEM == "table1"

@@ -22,8 +22,8 @@ def command(suite: str, controllers: str | None, episodes: int | None, as_json: 
     Figures for each of the four functions of an ice management system, as means over the episodes with 95 %
     intervals. A dash is a figure that no episode has, such as a detection delay without ice or without detection.
     """
-    from testbed.compare import compare
-    from testbed.suite import load
+    from testbed.comparison.compare import compare
+    from testbed.comparison.suite import load
 
     say = (lambda line: click.echo(line, err=True)) if sys.stderr.isatty() else None
     names = [name.strip() for name in controllers.split(",")] if controllers else None

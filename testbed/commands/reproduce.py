@@ -19,7 +19,7 @@ def command(names: tuple[str, ...], as_json: bool, seed: int) -> None:
     Rows marked `simulated` are analogues, rows marked `recorded` come from recorded flights and are left out where
     these are absent. When a row agrees is fixed per sort of number; disagreements are shown with their reason.
     """
-    from testbed.reproduce import reproduce
+    from testbed.reproduce.items import reproduce
 
     say = (lambda line: click.echo(line, err=True)) if sys.stderr.isatty() else None
     rows = reproduce(names or ("all",), seed, progress=say)

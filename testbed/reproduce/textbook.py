@@ -16,7 +16,7 @@ from pathlib import Path
 from estimators import equation_error, hinf_record
 from estimators.estimate import Estimate
 from icing_env.record import read
-from testbed.reproduce_row import Row, Rule, row
+from testbed.reproduce.row import Row, Rule, row
 
 ITEM = "textbook"
 DIGITS = Rule(relative=0.002)
@@ -34,7 +34,7 @@ COLUMNS = ("the book regresses on the smoothed columns that the record's owner s
 def folder() -> Path:
     """Where recorded flights lie, if anywhere."""
     return Path(os.environ.get("ICING_FLIGHT_DATA")
-                or Path(__file__).resolve().parents[2] / "shared" / "flight_data")
+                or Path(__file__).resolve().parents[3] / "shared" / "flight_data")
 
 
 def rows(seed: int) -> list[Row]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from testbed.reproduce_flight import SEEDS, fly_all, stepwise
-from testbed.reproduce_row import Row, Rule, row
+from testbed.reproduce.flight import SEEDS, fly_all, stepwise
+from testbed.reproduce.row import Row, Rule, row
 
 ITEM = "fig19"
 PAPER = 0.8

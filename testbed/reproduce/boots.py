@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from testbed.reproduce_flight import DEGREE, fly_all, hinf, stepwise
-from testbed.reproduce_row import Row, Rule, row
+from testbed.reproduce.flight import DEGREE, fly_all, hinf, stepwise
+from testbed.reproduce.row import Row, Rule, row
 
 ITEM = "fig17_18"
 SEEDS = 2

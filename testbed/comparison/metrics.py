@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from testbed.trace import INTERVAL, Trace
+from testbed.comparison.trace import INTERVAL, Trace
 
 FloatArray = NDArray[np.float64]
 DRAG, LOSS, ALLOWED = 0.01, 0.1, 60.0  # 1, 1, s

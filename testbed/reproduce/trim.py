@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from icing_env import aircraft
-from testbed.doublet_windows import Window
-from testbed.reproduce_flight import SEEDS, fly_all
-from testbed.reproduce_row import Row, Rule, row
+from testbed.reproduce.flight import SEEDS, fly_all
+from testbed.reproduce.row import Row, Rule, row
+from testbed.reproduce.windows import Window
 
 ITEM = "fig21_22"
 

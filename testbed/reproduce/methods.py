@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from icing_env import scenario as scenarios
-from testbed.doublet_windows import Window, fly_sets
-from testbed.reproduce_row import Row, Rule, row
+from testbed.reproduce.row import Row, Rule, row
+from testbed.reproduce.windows import Window, fly_sets
 
 ITEM = "tables2_5"
 DEGREE = np.pi/180.0

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from testbed.comparison.metrics import measure
+from testbed.comparison.suite import Suite
+from testbed.comparison.trace import trace
 from testbed.flight import CONTROLLERS, controller, make_world
-from testbed.metrics import measure
-from testbed.suite import Suite
-from testbed.trace import trace
 
 
 def compare(suite: Suite, controllers: Sequence[str] | None = None, episodes: int | None = None, seed: int = 0, *,

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from testbed.doublet_windows import Window
-from testbed.reproduce_flight import Flights, fly_all, stepwise
-from testbed.reproduce_row import Row, Rule, row
+from testbed.reproduce.flight import Flights, fly_all, stepwise
+from testbed.reproduce.row import Row, Rule, row
+from testbed.reproduce.windows import Window
 
 ITEM = "fig15_16"
 SEEDS = 3

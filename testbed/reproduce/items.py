@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 
 from icing_env.errors import InputError, nearest
-from testbed.reproduce_row import Row
+from testbed.reproduce.row import Row
 
 Item = Callable[[int], list[Row]]
 ITEMS: dict[str, tuple[str, str]] = {  # module of the item's `rows`, and what it is
@@ -41,6 +41,6 @@ def reproduce(names: Sequence[str] = ("all",), seed: int = 0, progress: Callable
         module, what = ITEMS[name]
         if progress is not None:
             progress(f"{name}: {what}")
-        item: Item = import_module(f"testbed.reproduce_{module}").rows
+        item: Item = import_module(f"testbed.reproduce.{module}").rows
         found += item(seed)
     return found

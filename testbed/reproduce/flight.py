@@ -14,8 +14,8 @@ from functools import lru_cache
 import numpy as np
 
 from icing_env import scenario as scenarios
-from testbed.doublet_windows import Window, fly_sets
-from testbed.reproduce_row import Row, Rule, row
+from testbed.reproduce.row import Row, Rule, row
+from testbed.reproduce.windows import Window, fly_sets
 
 ITEM = "flight_010302f1"
 SEEDS = 3

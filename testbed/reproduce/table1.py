@@ -10,9 +10,9 @@ import numpy as np
 
 from icing_env import scenario as scenarios
 from icing_env.scenario import Scenario
-from testbed.doublet_windows import Window, fly_sets
 from testbed.flight import fly
-from testbed.reproduce_row import Row, Rule, row
+from testbed.reproduce.row import Row, Rule, row
+from testbed.reproduce.windows import Window, fly_sets
 
 ITEM = "table1"
 LOAD = Rule(relative=0.2)

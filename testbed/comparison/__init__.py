@@ -1,0 +1,1 @@
+"""Controllers with and without protection on the same drawn cases: suites, episodes, figures of merit."""
