@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from types import SimpleNamespace
+from types import SimpleNamespace as Record
 from typing import Any
 
 import numpy as np
@@ -29,8 +29,6 @@ RADIUS, R, G0, T0, P0, LAPSE, H11 = 6356766.0, 287.05287, 9.80665, 288.15, 10132
 T11 = T0 - LAPSE * H11
 POWER = G0 / (R * LAPSE)
 P11 = P0 * (T11 / T0) ** POWER
-
-Record = SimpleNamespace
 
 
 # ---- section 1: files
