@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icing_env.jit import kernel
-from icing_env.random import STREAM_SHEDDING, uniform4
+from icing_env.random import BLOCK, STREAM_SHEDDING, Word, uniform4
 from icing_env.stagnation import FREEZING, catch, freezing_fraction, viscosity_of_air
 from icing_env.types import SURFACES, Field
 
@@ -72,7 +72,7 @@ def add_severity(eta: float, gain: float, saturation: float) -> float:
 
 
 @kernel
-def kept(s: Any, p: Any, dt: float, thickness: float, index: int) -> float:
+def kept(s: Any, p: Any, dt: float, thickness: float, block: Word) -> float:
     """Share of a surface's ice that wasting and random shedding leave in dt."""
     if thickness <= 0.0:
         return 1.0
@@ -85,7 +85,7 @@ def kept(s: Any, p: Any, dt: float, thickness: float, index: int) -> float:
     if p.shed_rate > 0.0:
         ratio = thickness / p.shed_thickness
         rate = p.shed_rate * ratio * ratio * math.exp(0.2 * (min(warm, 5.0) + 5.0))  # five-fold per 8 K; assumed
-        u, share, _, _ = uniform4(s.seed, STREAM_SHEDDING, s.step, index)
+        u, share, _, _ = uniform4(s.seed, STREAM_SHEDDING, s.step, block)
         if u < 1.0 - math.exp(-rate * dt):
             left *= 1.0 - (p.shed_share_low + share * (p.shed_share_high - p.shed_share_low))
     return left
@@ -94,31 +94,31 @@ def kept(s: Any, p: Any, dt: float, thickness: float, index: int) -> float:
 @kernel
 def waste_ice(s: Any, p: Any, dt: float) -> None:
     """Melting, sublimation and natural shedding of every surface."""
-    left = kept(s, p, dt, s.thickness_left_wing, 0)
+    left = kept(s, p, dt, s.thickness_left_wing, BLOCK[0])
     s.eta_left_wing *= left
     s.thickness_left_wing *= left
     s.ice_mass_left_wing *= left
-    left = kept(s, p, dt, s.thickness_right_wing, 1)
+    left = kept(s, p, dt, s.thickness_right_wing, BLOCK[1])
     s.eta_right_wing *= left
     s.thickness_right_wing *= left
     s.ice_mass_right_wing *= left
-    left = kept(s, p, dt, s.thickness_htail, 2)
+    left = kept(s, p, dt, s.thickness_htail, BLOCK[2])
     s.eta_htail *= left
     s.thickness_htail *= left
     s.ice_mass_htail *= left
-    left = kept(s, p, dt, s.thickness_vtail, 3)
+    left = kept(s, p, dt, s.thickness_vtail, BLOCK[3])
     s.eta_vtail *= left
     s.thickness_vtail *= left
     s.ice_mass_vtail *= left
-    left = kept(s, p, dt, s.thickness_struts, 4)
+    left = kept(s, p, dt, s.thickness_struts, BLOCK[4])
     s.eta_struts *= left
     s.thickness_struts *= left
     s.ice_mass_struts *= left
-    left = kept(s, p, dt, s.thickness_propeller, 5)
+    left = kept(s, p, dt, s.thickness_propeller, BLOCK[5])
     s.eta_propeller *= left
     s.thickness_propeller *= left
     s.ice_mass_propeller *= left
-    left = kept(s, p, dt, s.thickness_other, 6)
+    left = kept(s, p, dt, s.thickness_other, BLOCK[6])
     s.eta_other *= left
     s.thickness_other *= left
     s.ice_mass_other *= left

@@ -17,7 +17,7 @@ from typing import Any
 
 from icing_env import atmosphere
 from icing_env.jit import kernel
-from icing_env.random import STREAM_CLOUD, normal, uniform4
+from icing_env.random import BLOCK, STREAM_CLOUD, normal, uniform4
 from icing_env.types import Field
 
 NONE, CONTINUOUS_MAXIMUM, INTERMITTENT_MAXIMUM, LARGE_DROPS, PRESCRIBED = 0, 1, 2, 3, 4
@@ -146,7 +146,7 @@ def begin_gap(s: Any, length: float) -> None:
 @kernel
 def follow_track(s: Any, p: Any, mode: int, distance: float) -> None:
     """Move along clouds and gaps by a distance (m); cloud_left = 0 draws where a flight begins."""
-    u, share, size, where = uniform4(s.seed, STREAM_CLOUD, s.step, 0)
+    u, share, size, where = uniform4(s.seed, STREAM_CLOUD, s.step, BLOCK[0])
     cloud = max(-math.log(u) * p.cloud_length_mean, SHORTEST)
     gap = max(-math.log(u) * p.cloud_gap_mean, SHORTEST)
     if s.cloud_left == 0.0:
@@ -183,7 +183,7 @@ def advance_cloud(s: Any, p: Any, airspeed: float, dt: float) -> None:
     distance = airspeed * dt
     follow_track(s, p, mode, distance)
     decay = math.exp(-distance / p.cloud_noise_length)
-    n = normal(uniform4(s.seed, STREAM_CLOUD, s.step, 1)[0])
+    n = normal(uniform4(s.seed, STREAM_CLOUD, s.step, BLOCK[1])[0])
     s.cloud_lwc_noise = decay * s.cloud_lwc_noise + p.cloud_noise_std * math.sqrt(1.0 - decay * decay) * n
     s.lwc = 0.0
     if s.cloud_left > 0.0 and inside(mode, s.temperature, s.altitude):

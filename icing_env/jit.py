@@ -47,12 +47,12 @@ def cache_folder() -> str:
 
 def kernel(function: F) -> F:
     """Compile a scalar building block into its callers; called only from other compiled functions."""
-    return numba.njit(function, error_model="numpy", forceinline=True)  # type: ignore[no-any-return]
+    return numba.njit(function, error_model="numpy", forceinline=True, no_cfunc_wrapper=True)  # type: ignore[no-any-return]
 
 
 def block(function: F) -> F:
     """Compile a large piece that is called from several places: kept as one function, so that it compiles once."""
-    return numba.njit(function, error_model="numpy")  # type: ignore[no-any-return]
+    return numba.njit(function, error_model="numpy", no_cfunc_wrapper=True)  # type: ignore[no-any-return]
 
 
 def entry(function: F) -> F:

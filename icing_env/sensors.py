@@ -20,7 +20,7 @@ from icing_env.dynamics import forces
 from icing_env.frames import direction_cosines, euler_angles, to_local
 from icing_env.jit import kernel
 from icing_env.propulsion import torque
-from icing_env.random import STREAM_SENSORS, normal4
+from icing_env.random import BLOCK, STREAM_SENSORS, normal4
 from icing_env.types import Field
 
 NOISY = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "psi", "ax", "ay", "az", "elevator", "aileron",
@@ -114,17 +114,17 @@ def filter_flow_and_inertial(x: Any, s: Any, c: Any, p: Any, airspeed: float, al
 @kernel
 def read_fast(s: Any, m: Any, p: Any) -> None:
     """Flow, inertial and surface channels: scale, bias and noise (blocks 0 to 3 of the instrument stream)."""
-    n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, 0)
+    n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, BLOCK[0])
     m.airspeed = (1.0 + p.scale_airspeed)*s.pitot + p.bias_airspeed + p.noise_airspeed*n0
     m.alpha = (1.0 + p.scale_alpha)*s.filtered_alpha + p.bias_alpha + p.noise_alpha*n1
     m.beta = (1.0 + p.scale_beta)*s.filtered_beta + p.bias_beta + p.noise_beta*n2
     m.elevator = s.filtered_elevator + p.bias_elevator + p.noise_elevator*n3
-    n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, 1)
+    n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, BLOCK[1])
     m.p = (1.0 + p.scale_p)*s.filtered_p + p.bias_p + p.noise_p*n0
     m.q = (1.0 + p.scale_q)*s.filtered_q + p.bias_q + p.noise_q*n1
     m.r = (1.0 + p.scale_r)*s.filtered_r + p.bias_r + p.noise_r*n2
     m.aileron = s.filtered_aileron + p.bias_aileron + p.noise_aileron*n3
-    n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, 2)
+    n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, BLOCK[2])
     m.ax = (1.0 + p.scale_ax)*s.filtered_ax + p.bias_ax + p.noise_ax*n0
     m.ay = (1.0 + p.scale_ay)*s.filtered_ay + p.bias_ay + p.noise_ay*n1
     m.az = (1.0 + p.scale_az)*s.filtered_az + p.bias_az + p.noise_az*n2
@@ -137,7 +137,7 @@ def read_attitude(x: Any, s: Any, m: Any, p: Any, u: Any) -> float:
     phi, theta, psi = euler_angles(x.e0, x.e1, x.e2, x.e3)
     turn = psi - m.psi
     psi = m.psi + turn - 2.0*math.pi*math.floor(turn*(0.5/math.pi) + 0.5)
-    n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, 3)
+    n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, BLOCK[3])
     m.phi = phi + p.bias_phi + p.noise_phi*n0
     m.theta = theta + p.bias_theta + p.noise_theta*n1
     m.psi = psi + p.noise_psi*n2
@@ -151,7 +151,7 @@ def read_engines_and_navigation(x: Any, attitude: tuple, s: Any, m: Any, p: Any,
                                 thrust_right: float, hinge_e: float, hinge_a: float, static: float,
                                 noise: float) -> None:
     """Engines, hinge moments, static pressure, GPS, ten times a second (block 4)."""
-    n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, 4)
+    n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, BLOCK[4])
     m.thrust_left = (1.0 + p.scale_thrust)*thrust_left + p.noise_thrust*n0
     m.thrust_right = (1.0 + p.scale_thrust)*thrust_right + p.noise_thrust*n1
     m.hinge_moment_elevator = hinge_e + p.noise_hinge_moment*n2
@@ -168,7 +168,7 @@ def read_engines_and_navigation(x: Any, attitude: tuple, s: Any, m: Any, p: Any,
 @kernel
 def read_slow(s: Any, m: Any, p: Any) -> None:
     """Temperature and cloud probes, once a second (block 5)."""
-    n0, n1, n2, _n3 = normal4(s.seed, STREAM_SENSORS, s.step, 5)
+    n0, n1, n2, _n3 = normal4(s.seed, STREAM_SENSORS, s.step, BLOCK[5])
     m.temperature = s.temperature + p.bias_temperature + p.noise_temperature*n0
     m.lwc = max(0.0, s.lwc*(1.0 + p.noise_lwc*n1))
     m.mvd = s.mvd*max(0.0, 1.0 + p.noise_mvd*n2) if s.lwc > 0.0 else 0.0

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from icing_env.jit import kernel
-from icing_env.random import STREAM_TURBULENCE, STREAM_TURBULENCE_START, Word, normal, normal4, uniform, words4
+from icing_env.random import BLOCK, STREAM_TURBULENCE, STREAM_TURBULENCE_START, Word, normal, normal4, uniform, words4
 from icing_env.types import Field
 
 TURBULENCE_PARAMETERS: list[Field] = [
@@ -163,7 +163,7 @@ def uniform16(word: Word) -> float:
 def advance_translation(s: Any, sigma: float, airspeed: float, dt: float) -> None:
     """Advance the filters of u, v, w (one Philox block: 32 bits a noise, 16 for each pair's small second noise)."""
     length_uv, length_w, ratio = scales(s.altitude)
-    a, b, c, d = words4(s.seed, STREAM_TURBULENCE, s.step, 0)
+    a, b, c, d = words4(s.seed, STREAM_TURBULENCE, s.step, BLOCK[0])
     v1, v2 = normal(uniform(b)), normal(uniform16(d & _W16))
     w1, w2 = normal(uniform(c)), normal(uniform16(d >> _SHIFT16))
     tau = airspeed * dt / length_uv
@@ -185,7 +185,7 @@ def advance_rotation(s: Any, p: Any, airspeed: float, dt: float, v_before: float
     length_w = scales(s.altitude)[1]
     sigma_p, time_p = roll_spectrum(p.turbulence_sigma_w, length_w, p.span, airspeed)
     decay = math.exp(-dt / time_p)
-    n = normal(uniform(words4(s.seed, STREAM_TURBULENCE, s.step, 1)[0]))
+    n = normal(uniform(words4(s.seed, STREAM_TURBULENCE, s.step, BLOCK[1])[0]))
     s.dryden_p = decay * s.dryden_p + sigma_p * math.sqrt(1.0 - decay * decay) * n
     w_after, v_after = transverse(s.dryden_w1, s.dryden_w2), transverse(s.dryden_v1, s.dryden_v2)
     s.dryden_q = lag(s.dryden_q, w_before, w_after, dt / time_p)
@@ -233,8 +233,8 @@ def start_turbulence(s: Any, p: Any, airspeed: float) -> None:
     if sigma <= 0.0:
         return
     length_uv, length_w, ratio = scales(s.altitude)
-    n0, n1, n2, n3 = normal4(s.seed, STREAM_TURBULENCE_START, s.step, 0)
-    n4, n5, n6, n7 = normal4(s.seed, STREAM_TURBULENCE_START, s.step, 1)
+    n0, n1, n2, n3 = normal4(s.seed, STREAM_TURBULENCE_START, s.step, BLOCK[0])
+    n4, n5, n6, n7 = normal4(s.seed, STREAM_TURBULENCE_START, s.step, BLOCK[1])
     s.dryden_u = ratio * sigma * n0
     s.dryden_v1, s.dryden_v2 = ratio * sigma * n1, 0.5 * ratio * sigma * (n1 + n2)
     s.dryden_w1, s.dryden_w2 = sigma * n3, 0.5 * sigma * (n3 + n4)
