@@ -15,6 +15,10 @@ T0, P0 = 288.15, 101325.0  # K, Pa at sea level
 LAPSE = 0.0065  # K/m up to 11 km geopotential
 TROPOPAUSE = 11000.0  # m geopotential
 EXPONENT = G0/(GAS_CONSTANT*LAPSE)
+# Binomial coefficients of EXPONENT, and the relative change of temperature within which four of them are enough.
+BINOMIAL1, BINOMIAL2 = EXPONENT, EXPONENT*(EXPONENT - 1.0)/2.0
+BINOMIAL3 = BINOMIAL2*(EXPONENT - 2.0)/3.0
+BINOMIAL4, NEAR = BINOMIAL3*(EXPONENT - 3.0)/4.0, 3e-4
 T11 = T0 - LAPSE*TROPOPAUSE  # K at the tropopause
 P11 = P0*math.exp(EXPONENT*math.log(T11/T0))  # Pa, 22632.06 in table I
 
@@ -34,6 +38,27 @@ def static_air(altitude: float) -> tuple:
         kelvin = T0 - LAPSE*geopotential
         return kelvin, P0*math.exp(EXPONENT*math.log(kelvin*(1.0/T0)))
     return T11, P11*math.exp(-G0*(geopotential - TROPOPAUSE)/(GAS_CONSTANT*T11))
+
+
+@kernel
+def place_of_static_air(altitude: float) -> tuple:
+    """Standard pressure [Pa] and 1/temperature [1/K] from which `static_air_near` goes on; 0 above the tropopause."""
+    kelvin, pascal = static_air(altitude)
+    return pascal, 1.0/kelvin if kelvin > T11 else 0.0
+
+
+@kernel
+def static_air_near(altitude: float, pascal_there: float, per_kelvin_there: float) -> tuple:
+    """`static_air` at an altitude [m] near that of `place_of_static_air`, without exponential and logarithm.
+
+    p = p_there (T/T_there)^EXPONENT (US 1976 eq. 33a) as a binomial series in T/T_there - 1: within 13 m its fifth
+    term is below rounding. Farther away, and above the tropopause, the equation itself.
+    """
+    kelvin = T0 - LAPSE*(EARTH_RADIUS*altitude/(EARTH_RADIUS + altitude))
+    x = kelvin*per_kelvin_there - 1.0
+    if abs(x) > NEAR or kelvin < T11:
+        return static_air(altitude)
+    return kelvin, pascal_there*(1.0 + x*(BINOMIAL1 + x*(BINOMIAL2 + x*(BINOMIAL3 + x*BINOMIAL4))))
 
 
 @kernel

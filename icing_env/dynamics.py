@@ -14,7 +14,7 @@ from typing import Any
 
 from icing_env.actuators import aileron_hinge_moment, elevator_hinge_moment, floated, surface_rate
 from icing_env.aerodynamics import CT_MAX, lateral, longitudinal, separation, smootherstep, tail_angle
-from icing_env.atmosphere import GAS_CONSTANT, gravity, static_air
+from icing_env.atmosphere import GAS_CONSTANT, gravity, place_of_static_air, static_air_near
 from icing_env.frames import direction_cosines, to_body, to_local
 from icing_env.jit import block, kernel
 from icing_env.propulsion import power_available, thrust_per_power
@@ -29,6 +29,7 @@ AIRSPEED_FLOOR = 0.1524  # m/s (0.5 ft/s), floor of the normalised rates (NASA/T
 def present_aircraft(s: Any, p: Any, c: Any) -> None:
     """The aircraft of this step: coefficients and mass with the ice it carries, and reciprocals for the equations."""
     iced_aircraft(s, p, c)
+    c.standard_pressure, c.per_standard_temperature = place_of_static_air(s.altitude)
     c.per_mass, c.per_inertia_yy = 1.0/c.mass, 1.0/p.inertia_yy
     determinant = 1.0/(p.inertia_xx*p.inertia_zz - p.inertia_xz*p.inertia_xz)
     c.per_inertia_xx, c.per_inertia_zz = p.inertia_zz*determinant, p.inertia_xx*determinant
@@ -67,7 +68,7 @@ def forces(x: Any, attitude: tuple, s: Any, c: Any, p: Any) -> tuple:
     Returns: Fx, Fy, Fz, L, M, N, airspeed, alpha, beta, density, thrust left, thrust right, elevator and aileron hinge
     moments, static pressure.
     """
-    kelvin, static = static_air(x.altitude)
+    kelvin, static = static_air_near(x.altitude, c.standard_pressure, c.per_standard_temperature)
     density = p.density_factor*static/(GAS_CONSTANT*(kelvin + p.temperature_offset))
     airspeed, alpha, beta, sine, cosine, ua, va, wa, slowness = air_data(x, attitude, s, p)
     qbar = 0.5*density*airspeed*airspeed

@@ -20,12 +20,14 @@ from icing_env.cloud import advance_cloud
 from icing_env.dynamics import air_data, present_aircraft
 from icing_env.frames import direction_cosines
 from icing_env.ice_protection import advance_protection
-from icing_env.integrate import STAGES, TOGETHER, TRIAL, copy, rk4
+from icing_env.integrate import STAGES, TOGETHER, TRIAL, copy, numbers_of, rk4
 from icing_env.jit import bound, entry, kernel
 from icing_env.parameters import PARAMETERS
 from icing_env.sensors import hold_filter_constants, read_instruments, start_instruments
 from icing_env.turbulence import advance_turbulence, start_turbulence
 from icing_env.types import COMMAND, CONTINUOUS, CURRENT, MEASUREMENT, OUTCOME, STATE
+
+DUE = np.bool_(True)  # for a plain True numba would compile the instruments once more
 
 
 @kernel
@@ -57,8 +59,8 @@ def finish(x: Any, s: Any, m: Any, c: Any, p: Any, u: Any, o: Any, dt: float, te
 
 
 @entry
-def advance(state: Any, stage: Any, measurement: Any, current: Any, parameters: Any, command: Any, outcome: Any,
-            substeps: int, dt: float, ten_hertz: int, one_hertz: int) -> None:
+def advance(state: Any, stage: Any, numbers: Any, measurement: Any, current: Any, parameters: Any, command: Any,
+            outcome: Any, substeps: int, dt: float, ten_hertz: int, one_hertz: int) -> None:
     """One environment step of every row; `parameters` has a row per aircraft or one for all."""
     shared = len(parameters) == 1
     for first in range(0, len(state), TOGETHER):
@@ -68,7 +70,7 @@ def advance(state: Any, stage: Any, measurement: Any, current: Any, parameters: 
             prepare(state[i], current[i], parameters[0 if shared else i], command[i], outcome[i], dt, one_hertz)
             copy(stage[j, TRIAL], state[i])
         for _ in range(substeps):
-            rk4(stage, first, count, state, current, parameters, shared, command, dt/substeps)
+            rk4(stage, numbers, first, count, state, current, parameters, shared, command, dt/substeps)
         for j in range(count):
             i = first + j
             copy(state[i], stage[j, TRIAL])
@@ -92,7 +94,7 @@ def start(state: Any, stage: Any, measurement: Any, current: Any, parameters: An
         start_instruments(x, s, c, p, dt)
         measurement[i].time = 0.0
         measurement[i].psi = 0.0
-        read_instruments(x, s, measurement[i], c, p, command[i], outcome[i], True, True)
+        read_instruments(x, s, measurement[i], c, p, command[i], outcome[i], DUE, DUE)
 
 
 class Fleet:
@@ -129,7 +131,7 @@ class Fleet:
         """Arguments of each slice, made once: building views costs more than the flight."""
         shared = len(self.parameters) == 1
         self._calls = [
-            bound(advance, self.state[k], stage, self.measurement[k], self.current[k],
+            bound(advance, self.state[k], stage, numbers_of(stage), self.measurement[k], self.current[k],
              self.parameters if shared else self.parameters[k], self.command[k], self.outcome[k],
                   self.substeps, self.dt, *self.clocks)
             for k, stage in zip(self._slices, self._stages, strict=True)

@@ -182,6 +182,8 @@ CURRENT_FIELDS: list[Field] = [
     ("alpha_tail_stall", "rad", "tail angle (negative lift) at which the tailplane separates"),
     ("mass", "kg", "mass, ice included"),
     ("efficiency", "1", "propeller efficiency factor, ice included"),
+    ("standard_pressure", "Pa", "standard pressure at the altitude where the step begins"),
+    ("per_standard_temperature", "1/K", "1/standard temperature there; 0 above the tropopause"),
     # Reciprocals that every stage of the integration needs; a division costs ten multiplications.
     ("per_mass", "1/kg", "1/mass"),
     ("per_inertia_xx", "1/(kg m2)", "element of the inverse inertia tensor"),
