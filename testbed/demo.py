@@ -15,7 +15,14 @@ from typing import Any
 
 import tomli_w
 
-from testbed import demo_encounter, demo_encounter_report, demo_identify, demo_identify_report, demo_observer
+from testbed import (
+    demo_encounter,
+    demo_encounter_report,
+    demo_gap,
+    demo_identify,
+    demo_identify_report,
+    demo_observer,
+)
 from testbed.demo_parts import Tell, Verdict
 from testbed.report import Report
 
@@ -29,6 +36,8 @@ COMMANDS = (
     ("icing fly {hold} --seed 3 --no-protection", "the same cloud and gusts without protection"),
     ("icing fly clear_air --effect tail_ice --out iced.csv", "two doublet sets with ice on the tail"),
     ("icing identify iced.csv --method hinf", "what the observer finds in that record"),
+    ("icing diagnose {folder}/blind.csv --held-out {folder}/blind_held_out.csv --out diagnosis",
+     "the hidden difference again, with a report of its own"),
     ("icing effects", "the ways in which an aircraft may differ from its model"),
     ("icing compare --help", "controllers with and without protection on the same cases"),
     ("icing demo --seed 7", "this report from another seed"),
@@ -60,7 +69,7 @@ print("sum of rewards", round(total, 1))
 class Size:
     """How much is flown: seeds of the batch, and seconds of the hold (None: all) and of the observer's flight."""
 
-    flights: int = 32
+    flights: int = 24
     hold: float | None = None
     observed: float = 1500.0
 
@@ -88,26 +97,30 @@ def run(folder: Path, seed: int, size: Size, tell: Tell) -> Demonstration:
         tell: called with what is being done and the share of all that is done.
     """
     start = perf_counter()
-    encounter = demo_encounter.measure(seed, size.flights, _part(tell, 0.0, 0.75), size.hold)
-    observed = demo_observer.measure(seed, size.observed, _part(tell, 0.75, 0.85))
-    identified = demo_identify.measure(seed, _part(tell, 0.85, 0.92))
-    tell("drawing the report", 0.92)
+    encounter = demo_encounter.measure(seed, size.flights, _part(tell, 0.0, 0.6), size.hold)
+    observed = demo_observer.measure(seed, size.observed, _part(tell, 0.6, 0.65))
+    identified = demo_identify.measure(seed, _part(tell, 0.65, 0.7))
+    blind = demo_gap.measure(seed, folder, _part(tell, 0.7, 0.94))
+    tell("drawing the report", 0.94)
     report = Report("An aircraft in ice, and what can be known of it",
-                    "A Twin Otter collects ice, an observer notices, the protection acts; the same observer reads "
-                    "NASA's flight records. Every sentence marked ✓ or ! is computed from the flights below.",
+                    "A Twin Otter collects ice, an observer notices, the protection acts; flight records are "
+                    "identified, and a hidden difference is diagnosed. Every sentence marked ✓, ! or ✕ is computed "
+                    "from the flights below.",
                     provenance(seed, size))  # fmt: skip
     demo_encounter_report.write(report, encounter)
     demo_observer.write(report, observed)
     demo_identify_report.write(report, identified)
+    demo_gap.write(report, blind)
     scenario = folder / "holding_in_ice.toml"
-    write_next(report, scenario)
+    write_next(report, folder, scenario)
     path = report.write(folder / "report.html")
     scenario.write_text(tomli_w.dumps(demo_encounter.HOLD), encoding="utf-8")
     tell("done", 1.0)
     return Demonstration(
-        path, perf_counter() - start, {"encounter": encounter, "observer": observed, "identification": identified},
+        path, perf_counter() - start, {"encounter": encounter, "observer": observed, "identification": identified,
+                                       "diagnosis": blind},
         {"encounter": demo_encounter.verdicts(encounter), "observer": demo_observer.verdicts(observed),
-         "identification": demo_identify.verdicts(identified)})  # fmt: skip
+         "identification": demo_identify.verdicts(identified), "diagnosis": demo_gap.verdicts(blind)})  # fmt: skip
 
 
 def _part(tell: Tell, low: float, high: float) -> Tell:
@@ -126,10 +139,10 @@ def provenance(seed: int, size: Size) -> dict[str, str]:
             "numba": version("numba"), "machine": f"{platform.system()} {platform.machine()}"}  # fmt: skip
 
 
-def write_next(report: Report, scenario: Path) -> None:
+def write_next(report: Report, folder: Path, scenario: Path) -> None:
     """Add the section on what to try."""
     report.section("What to do next", NEXT)
-    report.table(("command", "what it does"), [(c.format(hold=scenario), what) for c, what in COMMANDS],
+    report.table(("command", "what it does"), [(c.format(hold=scenario, folder=folder), what) for c, what in COMMANDS],
                  "Commands to try (.venv/bin/icing, unless .venv is active).")
     report.text("And the environment from Python:")
     report.code(EXAMPLE)

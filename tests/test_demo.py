@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from testbed import demo, demo_encounter, demo_identify
+from icing_env import effects
+from testbed import demo, demo_encounter, demo_gap, demo_identify
 from testbed.demo_encounter import ALL, LIMITS, NONE, Fleet
 from testbed.flight import fly
 
@@ -37,7 +38,7 @@ def test_the_report_is_whole_and_needs_nothing_from_outside(shown: demo.Demonstr
     for part in shown.verdicts.values():
         for verdict in part:
             assert verdict.text.replace("'", "&#39;") in page
-    assert page.count("<h2>") >= 5 and page.count("data:image") >= 8
+    assert page.count("<h2>") >= 6 and page.count("data:image") >= 8
 
 
 def test_the_scenario_beside_the_report_flies_the_same_hold(shown: demo.Demonstration) -> None:
@@ -79,6 +80,25 @@ def test_verdicts_of_the_observer_follow_the_errors(shown: demo.Demonstration) -
     assert [v.kind for v in verdicts(exact)] == ["good", "good"]
     far = replace(o, estimate={name: 1.5*values for name, values in o.truth.items()})
     assert [v.kind for v in verdicts(far)] == ["caution", "caution"] and "50.0 % (rms)" in verdicts(far)[0].text
+
+
+def test_verdicts_of_the_diagnosis_follow_what_was_hidden(shown: demo.Demonstration) -> None:
+    b = shown.results["diagnosis"]
+    assert (b.effect, b.values) == demo_gap.draw(0)
+    named = b.found.hypotheses[0]["effects"]
+    alike = {b.effect, *named, *(o for e in b.found.effects if [e["name"]] == named
+             for o in e["indistinguishable_from"])}  # fmt: skip
+    for name, effect in effects.LIBRARY.items():
+        other = replace(b, effect=name, values={p.name: p.high for p in effect.parameters})
+        if name not in alike:
+            assert other.outcome in ("wrong", "untestable") and demo_gap.verdicts(other)[0].kind != "good"
+        elif [name] == named and b.found.verdict == "explained":
+            assert other.outcome == "right" and "outside" in demo_gap.verdicts(other)[1].text
+
+
+def test_the_blind_records_do_not_name_the_effect(shown: demo.Demonstration) -> None:
+    for name in ("blind.csv", "blind.toml", "blind_held_out.csv", "blind_held_out.toml"):
+        assert shown.results["diagnosis"].effect not in (shown.report.parent / name).read_text()
 
 
 def test_without_records_a_simulated_one_is_identified_and_that_is_said(

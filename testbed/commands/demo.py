@@ -22,8 +22,9 @@ MARKS = {"good": "[green]✓[/]", "caution": "[yellow]![/]", "bad": "[red]✕[/]
 def command(out: Path, quick: bool, as_json: bool, seed: int) -> None:
     """Fly the demonstration and write its report.
 
-    An icing encounter with and without protection, the observer's derivatives over time, and NASA's flight records
-    identified (ICING_FLIGHT_DATA names their folder; without them a simulated record stands in).
+    An icing encounter with and without protection, the observer's derivatives over time, NASA's flight records
+    identified (ICING_FLIGHT_DATA names their folder; without them a simulated record stands in), and a hidden
+    difference between model and aircraft, diagnosed.
     """
     from testbed.demo import FULL, QUICK
 
