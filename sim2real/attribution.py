@@ -39,6 +39,7 @@ class EffectFit:
         distance: whitened distance of the fitted signature from none, nuisances taken out.
         smallest: size at which that distance would be DETECTABLE; None where the range does not reach it.
         weights: of the rows at the estimate.
+        misfit: whitened square that is left over.
     """
 
     family: Family
@@ -49,15 +50,17 @@ class EffectFit:
     distance: float
     smallest: float | None
     weights: dict[int, float]
+    misfit: float
 
 
 @dataclass(frozen=True)
 class UnknownFit:
-    """Evidence for a generic discrepancy of one component, and its terms: (name, coefficient, standard error)."""
+    """A generic discrepancy of one component: its evidence, terms (name, coefficient, standard error) and misfit."""
 
     component: str
     log_evidence: float
     terms: tuple[tuple[str, float, float], ...]
+    misfit: float
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,13 @@ class Posterior:
     unknown_fits: tuple[UnknownFit, ...]
     classes: dict[str, tuple[str, ...]]
     reduced: FloatArray
+    tempering: float = 1.0  # what the evidence was divided by
+
+    @property
+    def least_misfit(self) -> float:
+        """Whitened square that the best of all explanations leaves over."""
+        found = [fit.misfit for fit in self.fits.values()] + [fit.misfit for fit in self.unknown_fits]
+        return min(found, default=float(self.reduced[0, 0]))
 
 
 def reduce(gram: FloatArray, bank: Bank, precision: FloatArray | None = None) -> FloatArray:
@@ -128,7 +138,9 @@ def fit_family(reduced: FloatArray, family: Family) -> EffectFit:
     cumulative = np.cumsum(np.exp(log_mass - total))
     low, mid, high = (float(np.interp(q, cumulative, grid)) for q in (0.025, 0.5, 0.975))
     weights = dict(zip(family.rows, _weights(family, np.array([mid]))[0], strict=True))
-    return EffectFit(family, total, mid, low, high, _distance(reduced, weights), _smallest(reduced, family), weights)
+    misfit = float(reduced[0, 0] - 2.0 * np.max(gain))
+    return EffectFit(family, total, mid, low, high, _distance(reduced, weights), _smallest(reduced, family), weights,
+                     misfit)
 
 
 def size_prior(parameter: Parameter, size: FloatArray) -> FloatArray:
@@ -201,7 +213,8 @@ def fit_unknown(reduced: FloatArray, bank: Bank) -> list[UnknownFit]:
             errors.append(scale * np.sqrt(np.diag(np.linalg.inv(inner))))
         k = int(np.argmax(logs))
         found = tuple((term.name, float(m), float(e)) for term, m, e in zip(terms, means[k], errors[k], strict=True))
-        out.append(UnknownFit(component, float(logsumexp(logs) - np.log(len(SCALES))), found))
+        left = float(reduced[0, 0] - means[k] @ t)
+        out.append(UnknownFit(component, float(logsumexp(logs) - np.log(len(SCALES))), found, left))
     return out
 
 

@@ -26,6 +26,7 @@ from sim2real.reconstruct import Reconstruction
 # deviations of the model's own uncertainty. A record's mass is known to about 1 % (assumed).
 SPREAD, MASS_SPREAD = 0.025, 0.01
 LAG_SPREAD = 0.02  # s, of an actuator's lag that nobody has measured (assumed)
+THRUST_SPREAD = 0.3  # of thrust that was not recorded and is balanced against the model's own drag (assumed)
 NUISANCE_STEP = 2.0  # standard deviations at which the derivative with respect to a nuisance is taken
 
 
@@ -34,9 +35,18 @@ class Nuisance:
     """One direction in which the model may be wrong without that being a gap; prior N(0, 1) in its own unit."""
 
     name: str
-    parameter: str  # of PARAMETERS
+    parameter: str  # of PARAMETERS; several joined by +
     factor: float  # relative standard deviation (or absolute, where `absolute`)
     absolute: bool = False
+    only: str = ""  # where the power comes from, if it holds for such records alone
+
+    def apply(self, rows: NDArray, row: int, power_from: str) -> None:
+        """Move one row of PARAMETERS by NUISANCE_STEP standard deviations in this direction."""
+        if self.only and self.only != power_from:
+            return
+        step = NUISANCE_STEP * self.factor
+        for name in self.parameter.split("+"):
+            rows[name][row] = rows[name][row] + step if self.absolute else rows[name][row] * (1.0 + step)
 
 
 @dataclass(frozen=True)
@@ -71,10 +81,11 @@ class Bank:
 
 
 def nuisances() -> tuple[Nuisance, ...]:
-    """Every non-zero derivative by `SPREAD`, the mass by `MASS_SPREAD`, the actuators' lags."""
+    """Every derivative by `SPREAD`, the mass by `MASS_SPREAD`, the actuators' lags, and thrust where it was guessed."""
     derivatives = [Nuisance(name, name, SPREAD) for name in DERIVATIVE_NAMES]
     lags = [Nuisance(f"{s}_lag", f"{s}_lag", LAG_SPREAD, True) for s in ("elevator", "aileron", "rudder")]
-    return (*derivatives, Nuisance("mass", "mass", MASS_SPREAD), *lags)
+    guessed = Nuisance("thrust", "thrust_factor_left+thrust_factor_right", THRUST_SPREAD, only="balance")
+    return (*derivatives, Nuisance("mass", "mass", MASS_SPREAD), *lags, guessed)
 
 
 def nodes(parameter: Parameter) -> tuple[float, ...]:
@@ -113,9 +124,7 @@ def parameter_rows(flight: Reconstruction, candidates: Bank) -> NDArray:
     base = flight.parameters
     rows = np.repeat(base, candidates.size)
     for j, nuisance in enumerate(candidates.nuisances, start=1):
-        value = base[nuisance.parameter][0]
-        step = NUISANCE_STEP * nuisance.factor
-        rows[nuisance.parameter][j] = value + step if nuisance.absolute else value * (1.0 + step)
+        nuisance.apply(rows, j, flight.power_from)
     for family in candidates.families:
         chosen = list(family.rows)
         rows[chosen] = effects.with_effects(

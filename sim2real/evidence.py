@@ -55,20 +55,22 @@ def gather(flight: Reconstruction, bank: Bank) -> Evidence:
     left = innovations(flight, rows[moved], gain.K, renamed)
     first = round(SETTLE / flight.dt)
     factor = whitening(left[first:, 0], gain, flight)
-    gram, samples = np.zeros((bank.size, bank.size)), 0
+    flown, samples = np.zeros((len(moved), len(moved))), 0
     whitened = np.zeros((len(left), len(MEASURED)))
     for k in range(first, len(left), CHUNK):
         part = whiten(left[k : k + CHUNK], factor)
         whitened[k : k + CHUNK] = part[:, 0]
         samples += int(np.count_nonzero(part[:, 0]))
-        flat = np.zeros((part.shape[0] * part.shape[2], bank.size))
-        flat[:, moved] = part.transpose(0, 2, 1).reshape(-1, len(moved))
-        flat[:, moved[1:]] -= flat[:, :1]
-        gram += flat.T @ flat
-    for _, path in path_residuals(flight, rows):
+        flat = part.transpose(0, 2, 1).reshape(-1, len(moved))
+        flat = flat[np.any(flat != 0.0, axis=1)]  # a sparse channel's blanks
+        flat[:, 1:] -= flat[:, :1]
+        flown += flat.T @ flat
+    gram = np.zeros((bank.size, bank.size))
+    gram[np.ix_(moved, moved)] = flown
+    for path, own in path_residuals(flight, rows):
         path = path[first:].copy()
         path[:, 1:] -= path[:, :1]
-        gram += path.T @ path
+        gram[np.ix_(own, own)] += path.T @ path
         samples += len(path)
     return Evidence(gram, gain.sigma, samples, whitened, flight)
 
@@ -80,7 +82,10 @@ def flown_rows(flight: Reconstruction, rows: FloatArray, pushed: set[int]) -> li
 
 
 def choose_gain(flight: Reconstruction, options: list[Gain]) -> tuple[Gain, FloatArray]:
-    """The gust intensity that makes the model's innovations likeliest, and those innovations [N-1, channels]."""
+    """The gust intensity that makes the model's innovations likeliest, and those innovations [N-1, channels].
+
+    Their size is taken from medians: a gap that shows as an offset or in the moments of a manoeuvre is no gust.
+    """
     left = innovations(flight, np.repeat(flight.parameters, len(options)), np.stack([g.K for g in options]))
     whole, left = left, left[round(SETTLE / flight.dt) :]
     scores = []
@@ -88,7 +93,9 @@ def choose_gain(flight: Reconstruction, options: list[Gain]) -> tuple[Gain, Floa
         use = [c for c in range(FED_BACK - 1) if flight.has(MEASURED[c])]
         z = np.nan_to_num(left[:, i, use].astype(float))
         factor = np.linalg.cholesky(gain.S[np.ix_(use, use)])
-        scores.append(-0.5 * np.sum(np.linalg.solve(factor, z.T) ** 2) - len(z) * np.sum(np.log(np.diag(factor))))
+        white = np.linalg.solve(factor, z.T)
+        away = np.median(np.abs(white - np.median(white, axis=1, keepdims=True)), axis=1)
+        scores.append(-0.5 * np.sum((1.4826 * away) ** 2) - np.sum(np.log(np.diag(factor))))
     best = int(np.argmax(scores))
     return options[best], whole[:, best].astype(float)
 

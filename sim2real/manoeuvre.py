@@ -14,7 +14,7 @@ from icing_env.errors import InputError
 from icing_env.record import FloatArray
 from icing_env.trim import trim
 from sim2real.attribution import INDISTINGUISHABLE, reduce
-from sim2real.candidates import NUISANCE_STEP, Bank
+from sim2real.candidates import Bank
 from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR
 from sim2real.evidence import SETTLE, whiten
 from sim2real.predictor import Predictor, gains, innovations, put
@@ -115,9 +115,7 @@ def distances(made: Reconstruction, bank: Bank, rivals: list[tuple[str, Mapping[
     """Whitened distance of every pair of effects along a manoeuvre, size of the second and nuisances free."""
     rows = np.repeat(made.parameters, 1 + len(bank.nuisances) + len(rivals))
     for j, nuisance in enumerate(bank.nuisances, start=1):
-        step = NUISANCE_STEP * nuisance.factor
-        rows[nuisance.parameter][j] = rows[nuisance.parameter][0] * (1.0 + step) if not nuisance.absolute else (
-            rows[nuisance.parameter][0] + step)
+        nuisance.apply(rows, j, made.power_from)
     for j, (name, values) in enumerate(rivals, start=1 + len(bank.nuisances)):
         rows[j : j + 1] = effects.with_effects(rows[j : j + 1], {name: values})
     gain = gains(made, (sigma,))[0]

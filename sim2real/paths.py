@@ -20,19 +20,31 @@ from sim2real.reconstruct import Reconstruction
 
 POSITION_NOISE = 5.2e-4  # rad, the least believed (0.03 deg)
 POWER_NOISE = 0.01  # of full power
+ACTUATOR = ("lag", "rate", "min", "max", "gearing", "offset")
+STILL_COMMAND, STILL_LEVER = 1e-4, 1e-3  # rad, 0..1: a command that moves less tests nothing
 
 
-def path_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple[str, FloatArray]]:
-    """For every path with a recorded command: its name and (measured - predicted)/noise [N, rows]."""
+def path_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple[FloatArray, list[int]]]:
+    """For every path with a recorded command: (measured - predicted)/noise [N, rows], and which rows of `parameters`.
+
+    Rows that differ from the first in nothing that the path knows are left out.
+    """
     out = []
     for surface in SURFACES:
         name = f"{surface}_command"
-        if name in flight.commands and np.ptp(flight.commands[name]) > 1e-4:
-            predicted = follow(flight.commands[name], flight.positions[surface][0], parameters, surface, flight.dt)
+        if name in flight.commands and np.ptp(flight.commands[name]) > STILL_COMMAND:
+            rows = _differing(parameters, [f"{surface}_{quantity}" for quantity in ACTUATOR])
             measured = flight.positions[surface]
+            predicted = follow(flight.commands[name], measured[0], parameters[rows], surface, flight.dt)
             noise = max(POSITION_NOISE, _spread(measured))
-            out.append((f"{surface}_path", (measured[:, None] - predicted) / noise))
+            out.append(((measured[:, None] - predicted) / noise, rows))
     return out + _engine_residuals(flight, parameters)
+
+
+def _differing(parameters: NDArray, names: list[str]) -> list[int]:
+    """Row 0 and the rows that differ from it in one of the parameters named."""
+    moved = np.any([parameters[n] != parameters[n][0] for n in names], axis=0)
+    return [0, *(int(i) for i in np.flatnonzero(moved))]
 
 
 def follow(command: FloatArray, start: float, p: NDArray, surface: str, dt: float) -> FloatArray:
@@ -57,26 +69,27 @@ def follow(command: FloatArray, start: float, p: NDArray, surface: str, dt: floa
     return out
 
 
-def _engine_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple[str, FloatArray]]:
+def _engine_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple[FloatArray, list[int]]]:
     if flight.power_from != "torque":
         return []
     out = []
     row: Any = flight.parameters[0]
     full = np.array([power_available(pressure(float(h)), row) for h in flight.altitude])
-    share = 1.0 - np.exp(-flight.dt / parameters["spool_time"])
+    rows = _differing(parameters, ["spool_time"])
+    share = 1.0 - np.exp(-flight.dt / parameters["spool_time"][rows])
     for side in ("left", "right"):
         lever = flight.commands.get(f"throttle_{side}")
-        if lever is None or np.ptp(lever) < 1e-3:
+        if lever is None or np.ptp(lever) < STILL_LEVER:
             continue
-        power = np.full(len(parameters), flight.controls[f"power_{side}"][0])
-        found = np.empty((len(lever), len(parameters)))
+        power = np.full(len(rows), flight.controls[f"power_{side}"][0])
+        found = np.empty((len(lever), len(rows)))
         found[0] = power
         for k in range(1, len(lever)):
             power = power + share * (full[k] * min(max(lever[k], 0.0), 1.0) - power)
             found[k] = power
         left = (flight.controls[f"power_{side}"][:, None] - found) / full[:, None]
         # the chart between lever and power is nobody's claim: a constant share and an offset are taken out
-        out.append((f"engine_{side}", _without_line(left, lever) / POWER_NOISE))
+        out.append((_without_line(left, lever) / POWER_NOISE, rows))
     return out
 
 

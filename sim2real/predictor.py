@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from icing_env.frames import direction_cosines, to_body
 from icing_env.record import FloatArray
-from icing_env.simulate import Fleet, processors
+from icing_env.simulate import Fleet
 from icing_env.turbulence import pair_noise, scales
 from icing_env.types import MEASUREMENT, STATE
 from sim2real.channels import FED_BACK, MEASURED, SURFACES
@@ -72,8 +72,7 @@ class Predictor:
 
     def __init__(self, flight: Reconstruction, parameters: NDArray) -> None:
         self.flight, self.n = flight, len(parameters)
-        self.fleet = Fleet(held(parameters, flight.dt), self.n, flight.dt, max(1, round(flight.dt / 0.02)),
-                           min(processors(), 2) if self.n > 64 else 1)
+        self.fleet = Fleet(held(parameters, flight.dt), self.n, flight.dt, max(1, round(flight.dt / 0.02)))
         self.x = self.fleet.state.view(np.float64).reshape(self.n, -1)
         self.y = self.fleet.measurement.view(np.float64).reshape(self.n, -1)
         self._surfaces = [(s, self.fleet.state[s], self.fleet.command[s]) for s in SURFACES]

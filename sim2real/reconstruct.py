@@ -100,6 +100,7 @@ def reconstruct(record: FlightRecord, base: NDArray | None = None) -> Reconstruc
     measured = _measured(record, grid.time[::every], values, dt)
     row = _airframe(record, aircraft.load() if base is None else base.copy(), values, notes)
     altitude = _air(row, values, notes)
+    row["wind_reference_altitude"] = float(np.median(altitude))  # a steady wind shows nowhere; only its change does
     positions = {n: values[n] if n in values else np.zeros(len(time)) for n in SURFACES}
     controls = {n: unfiltered(v, float(row["filter_frequency"][0]), dt) for n, v in positions.items()}
     controls["flap"] = values.get("flap", np.zeros(len(time)))

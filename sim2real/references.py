@@ -35,8 +35,8 @@ def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank) -> Baselin
     mean = -np.linalg.solve(precision, gram[1 : n + 1, 0] / NUISANCE_STEP)
     row = aircraft.load()
     for nuisance, size in zip(candidates.nuisances, mean, strict=True):
-        if nuisance.name == "mass":
-            continue  # every record states its own mass
+        if nuisance.name in ("mass", "thrust"):
+            continue  # a matter of each record
         change = size * nuisance.factor
         row[nuisance.parameter] = row[nuisance.parameter] + change if nuisance.absolute else (
             row[nuisance.parameter] * (1.0 + change))

@@ -37,8 +37,9 @@ def _closing(found: Diagnosis) -> str:
     if held["closure"] is None:
         return (f"On the held-out records the gap is {held['before']:.2f} tolerances, "
                 "no more than noise and gusts alone may give, so there is nothing to close.")
+    change = f"{100 * held['closure']:.0f} % closed" if held["closure"] > 0.0 else "it does not close"
     return (f"On the held-out records the gap goes from {held['before']:.2f} to {held['after']:.2f} tolerances: "
-            f"{100 * held['closure']:.0f} % closed; the worst channel is {held['worst_channel']}.")
+            f"{change}; the worst channel is {held['worst_channel']}.")
 
 
 def _next(found: Diagnosis) -> str:

@@ -1,0 +1,206 @@
+"""Diagnosis: injected effects are found, a clean aircraft is not blamed, the answer has its form and takes no hints."""
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from icing_env import scenario
+from icing_env.errors import InputError
+from icing_env.record import FlightRecord, RecordMeta, write
+from sim2real import gap
+from sim2real.attribution import size_prior
+from sim2real.candidates import bank, nodes, nuisances
+from sim2real.diagnosis import Diagnosis, credible, diagnose
+from sim2real.predictor import gains, innovations, linearise
+from sim2real.reconstruct import reconstruct, unfiltered
+from testbed.cli import _run
+from testbed.commands.diagnose import answer
+from testbed.flight import fly
+
+KEYS = {"verdict", "hypotheses", "credible_set_95", "where", "effects", "not_testable", "detection_limits", "unknown",
+        "gap", "next_manoeuvre", "resimulate", "data_problems", "provenance", "seconds"}  # fmt: skip
+
+
+@cache
+def flown(effect: str = "", value: float = 0.0, seed: int = 0, sigma: float = 0.5) -> FlightRecord:
+    name, _, parameter = effect.partition(":")
+    chosen = scenario.load("clear_air", duration=52.0, parameters={"turbulence_sigma_w": sigma},
+                           effects={name: {parameter: value}} if name else {})  # fmt: skip
+    return fly(chosen, seed=seed, observer=False, protection=False).record
+
+
+@cache
+def diagnosed(effect: str = "", value: float = 0.0, seed: int = 0, held_out: int | None = None) -> Diagnosis:
+    others = [flown(effect, value, held_out)] if held_out is not None else []
+    return diagnose([flown(effect, value, seed)], others)
+
+
+def first(found: Diagnosis) -> list[str]:
+    return found.hypotheses[0]["effects"]
+
+
+@pytest.mark.parametrize(("effect", "value"), [
+    ("lift_slope:change", -0.2), ("alpha_bias:offset", 0.009), ("aileron_power:change", 0.25),
+    ("elevator_lag:extra", 0.1),
+])  # fmt: skip
+def test_an_injected_effect_is_found_with_its_size(effect, value):
+    name, _, parameter = effect.partition(":")
+    found = diagnosed(effect, value, 3, 13 if name == "lift_slope" else None)
+    assert found.verdict == "explained"
+    assert first(found) == [name]
+    fitted = found.effects[0]["parameters"][parameter]
+    half = 0.5 * (fitted["high95"] - fitted["low95"])
+    assert abs(fitted["estimate"] - value) < 3.0 * half
+    assert half < abs(value)
+
+
+def test_the_gap_of_a_found_effect_closes_on_a_record_not_used():
+    held = diagnosed("lift_slope:change", -0.2, 3, 13).gap["held_out"]
+    assert held["before"] > held["after"]
+    assert held["closure"] > 0.6
+    assert held["closure_low95"] <= held["closure"] <= held["closure_high95"]
+
+
+def test_a_clean_aircraft_is_not_blamed_and_there_is_nothing_to_close():
+    found = diagnosed("", 0.0, 5, 6)
+    assert found.verdict == "no_gap"
+    assert found.gap["held_out"]["closure"] is None
+    assert found.resimulate["command"] == "icing fly clear_air"
+    assert "lift_slope" in found.detection_limits
+
+
+def test_an_effect_left_out_of_the_library_is_not_named():
+    found = diagnose([flown("lift_slope:change", -0.2, 3)], without=["lift_slope"])
+    assert found.verdict != "no_gap"
+    assert all("lift_slope" not in h["effects"] for h in found.hypotheses)
+
+
+def test_the_answer_has_its_form():
+    result = answer(diagnosed("lift_slope:change", -0.2, 3, 13))
+    assert set(result) == KEYS
+    assert sum(h["probability"] for h in result["hypotheses"]) == pytest.approx(1.0, abs=1e-9)
+    assert set(result["where"]) == {"channels", "components", "regimes"}
+    assert set(result["gap"]["held_out"]) == {"before", "after", "closure", "closure_low95", "closure_high95",
+                                              "worst_channel", "by_channel"}  # fmt: skip
+    tested = {e for h in result["hypotheses"] for e in h["effects"]}
+    assert tested.isdisjoint({n["effect"] for n in result["not_testable"]})
+    assert set(result["detection_limits"]) == tested
+
+
+def test_names_and_notes_of_a_record_change_nothing():
+    record = flown("alpha_bias:offset", 0.009, 3).slice(0.0, 20.0)
+    lying = replace(record, meta=replace(record.meta, name="mass_error", notes="mass_error 0.2", flight="thrust_loss"))
+    honest, told = diagnose([record]), diagnose([lying])
+    assert told.verdict == honest.verdict
+    assert [h["effects"] for h in told.hypotheses[:3]] == [h["effects"] for h in honest.hypotheses[:3]]
+    assert [h["probability"] for h in told.hypotheses] == pytest.approx(
+        [h["probability"] for h in honest.hypotheses], rel=1e-6, abs=1e-12)  # fmt: skip
+    assert told.provenance["records"][0]["sha256"] == honest.provenance["records"][0]["sha256"]
+
+
+def test_commands_absent_means_actuators_are_not_testable():
+    record = flown("elevator_lag:extra", 0.1, 3)
+    bare = replace(record, channels={n: v for n, v in record.channels.items() if not n.endswith("_command")})
+    found = diagnose([bare.slice(0.0, 30.0)])
+    missing = {n["effect"] for n in found.not_testable}
+    assert {"elevator_lag", "aileron_gearing", "rudder_lag"} <= missing
+    assert found.verdict == "no_gap"
+
+
+def test_truth_beside_a_record_is_never_opened(tmp_path, monkeypatch, capsys):
+    import builtins
+    import pathlib
+
+    path = tmp_path / "a.csv"
+    write(flown("", 0.0, 5).slice(0.0, 20.0), path)
+    (tmp_path / "a.truth.csv").write_text("time,lift_slope\n0,1\n")
+    opened = []
+    genuine_open, genuine_bytes = builtins.open, pathlib.Path.read_bytes
+    monkeypatch.setattr(builtins, "open", lambda f, *a, **k: (opened.append(str(f)), genuine_open(f, *a, **k))[1])
+    monkeypatch.setattr(pathlib.Path, "read_bytes", lambda p: (opened.append(str(p)), genuine_bytes(p))[1])
+    assert _run(["diagnose", str(path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["verdict"] == "no_gap"
+    assert str(path) in opened
+    assert not [f for f in opened if "truth.csv" in f]
+
+
+@pytest.mark.parametrize(("arguments", "word"), [
+    (["diagnose"], "RECORD"), (["diagnose", "no_such.csv"], "no_such.csv"),
+    (["diagnose", "{record}", "--without", "lift_slop"], "lift_slope"),
+])  # fmt: skip
+def test_bad_input_is_one_line_and_exit_2(arguments, word, tmp_path, capsys):
+    path = tmp_path / "a.csv"
+    write(flown("", 0.0, 5).slice(0.0, 20.0), path)
+    assert _run([a.format(record=path) for a in arguments]) == 2
+    said = capsys.readouterr().err.strip()
+    assert len(said.splitlines()) == 1
+    assert word in said
+
+
+def test_misfit_that_nothing_explains_counts_as_noise_and_not_as_proof():
+    record = flown("", 0.0, 5).slice(0.0, 30.0)
+    rough = np.sin(2.7 * record.time) * np.sign(np.sin(0.9 * record.time))
+    spoilt = dict(record.channels) | {"az": record["az"] + 2.0 * rough, "q": record["q"] + 0.03 * np.roll(rough, 7)}
+    found = diagnose([replace(record, channels=spoilt)])
+    assert found.verdict != "no_gap"
+    assert found.provenance["tempering"] > 2.0
+
+
+def test_a_record_without_what_is_needed_is_refused():
+    record = flown("", 0.0, 5)
+    short = FlightRecord({n: v for n, v in record.channels.items() if n != "theta"}, RecordMeta(name="x"))
+    with pytest.raises(InputError, match="lacks theta"):
+        diagnose([short])
+
+
+def test_innovations_of_the_true_model_are_white_and_of_their_predicted_size():
+    flight = reconstruct(flown("", 0.0, 5))
+    gain = gains(flight, (0.5,))[0]
+    left = innovations(flight, flight.parameters, gain.K)[200:, 0, :11].astype(float)
+    size = np.mean(left**2, axis=0) / np.diag(gain.S)[:11]
+    assert np.all((size > 0.6) & (size < 1.3))
+    following = [np.corrcoef(c[1:], c[:-1])[0, 1] for c in left.T]
+    assert np.max(np.abs(following)) < 0.2
+
+
+def test_the_predictor_forgets_its_start():
+    flight = reconstruct(flown("", 0.0, 5))
+    A, C, _ = linearise(flight)
+    for gain in gains(flight, (0.02, 0.5, 2.0)):
+        assert np.max(np.abs(np.linalg.eigvals(A - gain.K @ C))) < 1.0
+
+
+def test_undoing_the_low_pass_gives_the_positions_back():
+    rng = np.random.default_rng(0)
+    truth = rng.standard_normal(200)
+    share = 1.0 - np.exp(-2.0 * np.pi * 10.0 * 0.02)
+    seen = np.empty(200)
+    seen[0] = truth[0]
+    for k in range(1, 200):
+        seen[k] = seen[k - 1] + share * (truth[k] - seen[k - 1])
+    assert unfiltered(seen, 10.0, 0.02) == pytest.approx(truth, abs=1e-12)
+
+
+def test_every_effect_has_sizes_to_try_inside_its_range():
+    candidates = bank()
+    assert len({row for f in candidates.families for row in f.rows} | {t.row for t in candidates.terms}) == (
+        candidates.size - 1 - len(nuisances()))  # fmt: skip
+    for family in candidates.families:
+        p = family.parameter
+        assert all(p.low <= s <= p.high and s != p.neutral for s in nodes(p))
+        grid = np.linspace(p.low, p.high, 801)
+        assert np.sum(size_prior(p, grid) * np.gradient(grid)) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_credible_set_is_the_smallest_that_holds_95_percent():
+    assert credible([0.96, 0.04]) == [0]
+    assert credible([0.6, 0.34, 0.06]) == [0, 1, 2]
+
+
+def test_gap_is_zero_for_noise_and_counts_what_exceeds_it():
+    alone = np.full((5, 3, 2), 0.04)
+    assert gap.g(np.full((3, 2), 0.04), alone) == 0.0
+    assert gap.g(np.full((3, 2), 1.04), alone) == pytest.approx(1.0)
