@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from icing_env.jit import entry
+from icing_env.jit import entry, kernel
 from icing_env.observation import Axes
 
 Mode = Literal["surfaces", "targets"]
@@ -43,10 +43,30 @@ def columns(mode: Mode, axes: Axes) -> NDArray[np.int64]:
     return np.array([kept.index(n) if n in kept else -1 for n in NAMES[mode]])
 
 
+@kernel
+def first_bad_row(action: Any) -> int:
+    """Clip the actions in place; index of the first row that holds something not finite, or -1 (nothing changed)."""
+    for i in range(action.shape[0]):
+        for j in range(action.shape[1]):
+            if not math.isfinite(action[i, j]):
+                return i
+    for i in range(action.shape[0]):
+        for j in range(action.shape[1]):
+            action[i, j] = min(max(action[i, j], -1.0), 1.0)
+    return -1
+
+
 @entry
-def to_surfaces(action: Any, column: Any, trim: Any, command: Any) -> None:
-    """Surface commands of every row from the action, around the trim."""
-    for i in range(len(command)):
+def check(action: Any) -> int:
+    """`first_bad_row`, from Python."""
+    return first_bad_row(action)
+
+
+@entry
+def to_surfaces(action: Any, column: Any, trim: Any, command: Any) -> int:
+    """Surface commands of every row from the action, around the trim; the result of `first_bad_row`."""
+    bad = first_bad_row(action)
+    for i in range(len(command) if bad < 0 else 0):
         c, t = command[i], trim[i]
         if column[0] >= 0:
             c.elevator = t.elevator + ELEVATOR*action[i, column[0]]
@@ -57,12 +77,14 @@ def to_surfaces(action: Any, column: Any, trim: Any, command: Any) -> None:
         if column[3] >= 0:
             throttle = min(max(t.throttle_left + THROTTLE*action[i, column[3]], 0.0), 1.0)
             c.throttle_left, c.throttle_right = throttle, throttle
+    return bad
 
 
 @entry
-def to_targets(action: Any, column: Any, task: Any, target: Any) -> None:
-    """Autopilot targets of every row from the action."""
-    for i in range(len(target)):
+def to_targets(action: Any, column: Any, task: Any, target: Any) -> int:
+    """Autopilot targets of every row from the action; the result of `first_bad_row`."""
+    bad = first_bad_row(action)
+    for i in range(len(target) if bad < 0 else 0):
         g, k = target[i], task[i]
         if column[0] >= 0:
             g.pitch_mode, g.climb_rate = 2.0, CLIMB_RATE*action[i, column[0]]
@@ -70,16 +92,4 @@ def to_targets(action: Any, column: Any, task: Any, target: Any) -> None:
             g.airspeed = k.start_airspeed + AIRSPEED*action[i, column[1]]
         if column[2] >= 0:
             g.roll_mode, g.phi = 0.0, BANK*action[i, column[2]]
-
-
-@entry
-def first_bad_row(action: Any, low: float, high: float) -> int:
-    """Clip the actions in place; index of the first row that holds something not finite, or -1 (nothing changed)."""
-    for i in range(action.shape[0]):
-        for j in range(action.shape[1]):
-            if not math.isfinite(action[i, j]):
-                return i
-    for i in range(action.shape[0]):
-        for j in range(action.shape[1]):
-            action[i, j] = min(max(action[i, j], low), high)
-    return -1
+    return bad

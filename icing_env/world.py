@@ -89,14 +89,15 @@ class World:
                                f.current, f.command, f.parameters, *layout)
         self._look = bound(look, *layout)
         self._excite = bound(excite, f.command, f.measurement, self.doublets) if len(self.doublets) else None
-        self._check = bound(actions.first_bad_row, self.action, -1.0, 1.0)
         columns = actions.columns(mode, axes) if mode else None
-        self._to_surfaces = bound(actions.to_surfaces, self.action, columns, self.trimmed, f.command
-                                  ) if mode == "surfaces" else None
-        self._to_targets = bound(actions.to_targets, self.action, columns, self.task, loop.target
-                                 ) if mode == "targets" else None
+        # what an action does at once, and what it does after the autopilot has flown the axes that it leaves open
+        self._accept = self._overlay = None
+        if mode == "targets":
+            self._accept = bound(actions.to_targets, self.action, columns, self.task, loop.target)
+        elif mode == "surfaces":
+            act = bound(actions.to_surfaces, self.action, columns, self.trimmed, f.command)
+            self._accept, self._overlay = (act, None) if axes == "all" else (bound(actions.check, self.action), act)
         self._fly, self._steer, self._protect, self._observe = f.step, loop.steer, loop.protect, loop.observe
-        # the autopilot flies whatever the action leaves open
         self._steered = mode != "surfaces" or axes != "all"
 
     def reset(self, rows: NDArray | None = None, seeds: Sequence[int] | None = None,
@@ -206,33 +207,32 @@ class World:
         Raises:
             InputError: an action that is not finite (its row is named, nothing has changed) or of the wrong shape.
         """
-        if action is not None:
+        if self._accept is not None:
             self._take(action)
+        if self.scheduled:
+            self._follow_schedule(np.flatnonzero(self.steps % self.fleet.clocks[1] == 0.0))
         if self._steered:
             self._steer()
-        if self._to_surfaces is not None:
-            self._to_surfaces()
+        if self._overlay is not None:
+            self._overlay()
         if self._excite is not None:
             self._excite()
         self._protect()
         self._fly()
-        if self.scheduled and self.task["steps"][0] % self.fleet.clocks[1] == 0:
-            self._follow_schedule(np.arange(self.n))
         self._observe()
         self._conclude()
 
-    def _take(self, action: NDArray) -> None:
-        """Check and store the action; targets reach the autopilot at once."""
-        if getattr(action, "shape", None) != self._shape:
-            raise InputError(f"action must have shape {self.action.shape} ({', '.join(self.action_names)}), "
-                             f"got {np.shape(action)}")
-        self.action[:] = action
-        bad = self._check()
+    def _take(self, action: NDArray | None) -> None:
+        """Store the action, check it and act on it at once as far as that is its own."""
+        if action is not None:
+            if getattr(action, "shape", None) != self._shape:
+                raise InputError(f"action must have shape {self._shape} ({', '.join(self.action_names)}), "
+                                 f"got {np.shape(action)}")
+            self.action[:] = action
+        bad = self._accept() if self._accept else -1
         if bad >= 0:
-            raise InputError(f"action of row {bad} is not finite: {np.asarray(action, float)[bad].tolist()}; "
+            raise InputError(f"action of row {bad} is not finite: {self.action[bad].tolist()}; "
                              "every value must be a number in [-1, 1]")
-        if self._to_targets is not None:
-            self._to_targets()
 
     @property
     def action_names(self) -> tuple[str, ...]:

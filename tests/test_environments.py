@@ -277,3 +277,17 @@ def test_the_card_lists_every_channel_with_unit_and_bounds() -> None:
     for i, c in enumerate(CHANNELS):
         assert f"| {i} | `{c.name}` | {c.unit} | {c.low:.4g} | {c.high:.4g} |" in text, c.name
     assert all(name in text for name in IDS) and all(f"| {task} |" in text for task in TASKS)
+
+
+def test_a_scheduled_row_follows_its_own_clock_after_another_began_anew() -> None:
+    changes = {"duration": 3.0, "cloud": [{"time": float(t), "lwc": 1e-4*t, "mvd": 2e-5, "temperature": 268.0}
+                                          for t in range(4)]}
+    batch = gym.make_vec("icing_env/TwinOtter-v0", num_envs=2, changes=changes, autoreset_mode="Disabled", mode="targets")
+    batch.reset(seed=40)
+    alone = make(changes=changes, mode="targets")
+    alone.reset(seed=41)
+    action = np.zeros((2, 3), np.float32)
+    for step in range(149):
+        if step == 27:  # row 0 begins anew in the middle of a second
+            batch.reset(options={"reset_mask": np.array([True, False])})
+        assert np.array_equal(batch.step(action)[0][1], alone.step(action[1])[0]), step
