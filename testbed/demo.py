@@ -27,7 +27,7 @@ from testbed.demo_parts import Tell, Verdict
 from testbed.report import Report
 
 NEXT = """
-Everything in this report is one command or a few lines away. `icing --help` lists the verbs; every verb has an
+Everything in this report is one command or a few lines away. icing --help lists the verbs; every verb has an
 example in its own --help. The hold of the first section lies beside this report as a scenario file: change it, and fly
 it again.
 """

@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from icing_env.scenario import Scenario, load
-from icing_env.tasks import REASONS
-from icing_env.world import World
+from icing_env.scenario import CloudPoint, Scenario, load
+from testbed.demo_fleet import ALL, LIMITS, NONE, Fleet, fly_fleet
 from testbed.demo_parts import COUNT, FOOT, Tell, Verdict, rms
-from testbed.environments import loop_factory
 from testbed.flight import Flight, fly
 
 MINUTE = 60.0  # s
@@ -31,40 +29,6 @@ HOLD = {
     "parameters": {"turbulence_sigma_w": 0.5, "temperature_offset": -1.6, "cloud_gap_mean": 0.0,
                    "cloud_lwc_share_low": 0.5, "cloud_lwc_share_high": 1.0},
 }  # fmt: skip
-NONE, LIMITS, ALL = "no protection", "limits alone", "boots and limits"
-LOOPS = {
-    NONE: {"observer": False, "management": False, "protection": False},
-    LIMITS: {"boots": False},
-    ALL: {},
-}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Fleet:
-    """How one way of protecting ended, by seed, each (n,).
-
-    Attributes:
-        lost_at: when the flight ended early, s; nan where it did not.
-        reason: why, "" where it did not.
-        margin: least distance of the true angle of attack from the onset of separation, rad; negative: stalled.
-        airspeed: lowest, m/s.
-        descent: altitude given up at the lowest point, m.
-        eta: largest wing severity.
-    """
-
-    lost_at: NDArray[np.float64]
-    reason: list[str]
-    margin: NDArray[np.float64]
-    airspeed: NDArray[np.float64]
-    descent: NDArray[np.float64]
-    eta: NDArray[np.float64]
-
-    @property
-    def lost(self) -> int:
-        """Number of aircraft lost."""
-        return int(np.isfinite(self.lost_at).sum())
-
-
 @dataclass(frozen=True)
 class Encounter:
     """The flights of this part: two in detail with `seed`, and `fleets` by way of protecting, over `seeds`."""
@@ -90,41 +54,24 @@ def measure(seed: int, flights: int, tell: Tell, duration: float | None = None) 
     tell("compiling the flight model (once; kept for later)", 0.0)
     protected = fly(hold, seed=seed, rate=RATE)
     tell("the hold without protection", 0.3)
-    unprotected = fly(hold, seed=seed, rate=RATE, protection=False)
+    unprotected = fly(in_the_cloud_of(protected, hold), seed=seed, rate=RATE, protection=False)
     seeds = list(range(seed, seed + flights))
-    tell(f"the same hold with {flights} seeds, three ways", 0.4)
+    tell(f"the same hold with {flights} seeds, protected", 0.4)
+    first, cloud = fly_fleet(hold, seeds, ALL)
+    tell(f"the same hold with {flights} seeds, without boots and without anything", 0.7)
     with ThreadPoolExecutor(2) as pool:  # stepping releases the interpreter; two cores
-        done = {name: pool.submit(fly_fleet, hold, seeds, name) for name in (ALL, LIMITS, NONE)}
-        fleets = {name: done[name].result() for name in (NONE, LIMITS, ALL)}
-    return Encounter(hold, seed, unprotected, protected, seeds, fleets)
+        done = {name: pool.submit(fly_fleet, hold, seeds, name, cloud) for name in (NONE, LIMITS)}
+        fleets = {name: done[name].result()[0] for name in (NONE, LIMITS)}
+    return Encounter(hold, seed, unprotected, protected, seeds, {**fleets, ALL: first})
 
 
-def stall_margin(current: NDArray, outcome: NDArray) -> NDArray[np.float64]:
-    """True angle of attack below the onset of separation on the worse wing, rad, flap up."""
-    return np.minimum(current["alpha_stall_left"], current["alpha_stall_right"]) - outcome["alpha"]
-
-
-def fly_fleet(hold: Scenario, seeds: list[int], protection: str) -> Fleet:
-    """Fly one aircraft per seed to the end, protected as LOOPS says; what happens after a loss does not count."""
-    n = len(seeds)
-    world = World(hold, n, loop_factory(**LOOPS[protection]))
-    world.reset(seeds=seeds)
-    f = world.fleet
-    lost_at, reason, start = np.full(n, np.nan), [""] * n, f.state["altitude"].copy()
-    margin, airspeed = np.full(n, np.inf), np.full(n, np.inf)
-    descent, eta = np.zeros(n), np.zeros(n)
-    for k in range(world.limit):
-        world.step()
-        ended = world.terminated & np.isnan(lost_at)
-        if k % 5 == 0 or ended.any():
-            flying = np.isnan(lost_at)
-            np.minimum(margin, stall_margin(f.current, f.outcome), out=margin, where=flying)
-            np.minimum(airspeed, f.outcome["airspeed"], out=airspeed, where=flying)
-            np.maximum(descent, start - f.state["altitude"], out=descent, where=flying)
-            np.maximum(eta, 0.5*(f.state["eta_left_wing"] + f.state["eta_right_wing"]), out=eta, where=flying)
-        for i in np.flatnonzero(ended):
-            lost_at[i], reason[i] = (k + 1)*world.dt, REASONS[int(world.task["reason"][i])]
-    return Fleet(lost_at, reason, margin, airspeed, descent, eta)
+def in_the_cloud_of(flight: Flight, hold: Scenario) -> Scenario:
+    """The hold in the very cloud that `flight` met: a slower aircraft would else come to its next cloud later."""
+    t = flight.truth
+    every = round(2.0*RATE)
+    rows = zip(*(t[name][::every].tolist() for name in ("time", "lwc", "mvd", "temperature")), strict=True)
+    points = tuple(CloudPoint(time=a, lwc=b, mvd=c, temperature=d) for a, b, c, d in rows)
+    return hold.model_copy(update={"cloud": points})
 
 
 def margin_of(flight: Flight) -> NDArray[np.float64]:

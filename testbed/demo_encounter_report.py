@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from icing_env.display import DisplayView, draw
 from icing_env.types import MEASUREMENT
-from testbed.demo_encounter import ALL, LIMITS, MINUTE, Encounter, Fleet, detected_at, excess_drag, verdicts
+from testbed.demo_encounter import MINUTE, Encounter, detected_at, excess_drag, verdicts
+from testbed.demo_fleet import ALL, LIMITS, Fleet
 from testbed.demo_parts import COUNT, FOOT, KNOT, write_verdicts
 from testbed.flight import Flight
 from testbed.plot_style import ROLES, legend_above, line, styled
@@ -23,7 +24,7 @@ certification assumes of a hold. The autopilot keeps altitude, speed and heading
 small and the water content is in the upper half of 14 CFR 25 Appendix C, continuous maximum, so that the ice is mostly
 glaze, the more harmful kind.
 
-The same hold is flown twice with the same seed, which gives both the same cloud and the same gusts. Once boots,
+The same hold is flown twice, in the same gusts and, second by second, in the same water and drops. Once boots,
 propeller heat and limits are off and nobody looks over the autopilot's shoulder. Once an observer estimates the drag
 and the derivatives from the instruments alone; an ice management declares ice, switches on boots and propeller heat,
 and moves the limits on angle of attack, speed and bank; and the autopilot and the envelope protection keep to them.
@@ -118,13 +119,14 @@ def history(flights: dict[str, Flight]) -> Figure:
     """Seven panels against time: cloud, ice, drag, angle of attack, airspeed, throttle, boots."""
     figure = Figure(figsize=(9.2, 11.6), layout="constrained")
     panels = list(figure.subplots(7, 1, sharex=True, height_ratios=(1, 1, 1.4, 1.7, 1.4, 1, 0.5)))
-    for name, flight in flights.items():
-        c, style = _curves(flight), ROLES[name]
+    curves = {name: _curves(flight) for name, flight in flights.items()}
+    for name, c in curves.items():
         for axes, key in zip(panels, ("lwc", "eta", "estimate", "alpha", "airspeed", "throttle", "boots"), strict=True):
-            line(axes, c["time"], c[key], label=name, **style)
+            line(axes, c["time"], c[key], label=name, **ROLES[name])
+    for name, c in curves.items():
         line(panels[2], c["time"], c["drag"], label="truth", **ROLES["truth"])
         line(panels[3], c["time"], c["onset"], label=f"onset of separation, {name}",
-             color=style["color"], linestyle=(0, (4, 2)))  # fmt: skip
+             color=ROLES[name]["color"], linestyle=(0, (4, 2)))  # fmt: skip
         if name == "protected":
             line(panels[3], c["time"], c["alpha_limit"], label="advised limit", **ROLES["limit"])
             line(panels[4], c["time"], c["airspeed_limit"], label="advised limit", **ROLES["limit"])

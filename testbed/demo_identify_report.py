@@ -41,8 +41,8 @@ def write(report: Report, found: list[Identified]) -> None:
         report.figure(courses(i), f"{i.title}: how the observer, started at {STARTS[0]:g} and at {STARTS[1]:g} of the "
                       "published model, comes to its values. Nothing moves until the controls do.")
         report.table(headers(i), rows(i), f"{i.title}, per rad, standard errors in brackets. A derivative that the "
-                     "record does not show is refused. H-infinity gives forces as lift, the textbook as CZ = −CL at "
-                     "small angles.")
+                     "record does not show is refused."
+                     + (" H-infinity gives lift, CL, the textbook CZ." if "CL_alpha" in i.names else ""))
     close = f"Two methods agree where they differ by less than {100*CLOSE:.0f} % or by less than two standard errors."
     report.text(close)
 

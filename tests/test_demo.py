@@ -14,7 +14,7 @@ import pytest
 
 from icing_env import effects
 from testbed import demo, demo_encounter, demo_gap, demo_identify
-from testbed.demo_encounter import ALL, LIMITS, NONE, Fleet
+from testbed.demo_fleet import ALL, LIMITS, NONE, Fleet
 from testbed.flight import fly
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
