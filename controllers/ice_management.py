@@ -194,10 +194,14 @@ def step(
 
 @entry
 def operate(command: NDArray[Any], advisory: NDArray[Any]) -> None:
-    """Switch on in COMMAND rows the ice protection that the ADVISORY rows ask for; nothing is switched off."""
+    """Switch boots and heat in COMMAND rows as the ADVISORY rows ask: on with the ice, off with the all-clear.
+
+    While the management operates the ice protection, the switches are its own; a crew that wants them back switches
+    the management's hand off (`boots=False`).
+    """
     for i in range(len(command)):
         c, a = command[i], advisory[i]
-        c.boots_wing = max(c.boots_wing, a.boots_wing)
-        c.boots_tail = max(c.boots_tail, a.boots_tail)
-        c.boots_vtail_struts = max(c.boots_vtail_struts, a.boots_vtail_struts)
-        c.prop_heat = max(c.prop_heat, a.prop_heat)
+        c.boots_wing = a.boots_wing
+        c.boots_tail = a.boots_tail
+        c.boots_vtail_struts = a.boots_vtail_struts
+        c.prop_heat = a.prop_heat

@@ -18,4 +18,5 @@ for name, observer in (("observer", True), ("blind", False)):
         margin = min(margin, float(np.min(current["alpha_stall_left"] - world.fleet.outcome["alpha"])))
     severity = float(np.mean(world.loop.advisory["severity"]))
     limit = float(np.degrees(np.mean(world.loop.advisory["alpha_limit"])))
-    print(f"{name:9s} severity {severity:.2f}, alpha limit {limit:.1f} deg, least margin to stall {np.degrees(margin):.1f} deg")
+    print(f"{name:9s} severity {severity:.2f}, alpha limit {limit:.1f} deg, "
+          f"least margin to stall {np.degrees(margin):.1f} deg")

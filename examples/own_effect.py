@@ -7,7 +7,8 @@ from icing_env.effects import Effect, Parameter
 from icing_env.trim import trim
 
 
-def apply(p, values):
+def apply(p: np.ndarray, values: dict[str, float]) -> None:
+    """One unit of bugs costs 5 % of lift slope and 40 drag counts."""
     p["CZ_alpha"] *= 1.0 - 0.05*np.asarray(values["amount"])
     p["CD_parasite"] += 0.004*np.asarray(values["amount"])
 

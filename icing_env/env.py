@@ -53,7 +53,7 @@ class TwinOtterEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._window: Any = None
         names = self.world.task.dtype.names or ()
         first, last = names.index(f"reward_{REWARD_TERMS[0]}"), names.index("reason")
-        self._numbers = self.world.task.view(np.float64)[first:last + 1]  # reward terms, their sum, ..., truncated, reason
+        self._numbers = self.world.task.view(np.float64)[first:last + 1]  # terms, their sum, ..., truncated, reason
         self._seen = self.world.view.out[0]
         self._seeded = False
 

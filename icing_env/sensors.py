@@ -175,7 +175,7 @@ def read_slow(s: Any, m: Any, p: Any) -> None:
 
 
 @kernel
-def read_instruments(x: Any, s: Any, m: Any, c: Any, p: Any, u: Any, o: Any, ten_hertz: bool, one_hertz: bool) -> None:
+def read_instruments(x: Any, s: Any, m: Any, c: Any, p: Any, u: Any, o: Any, ten_hertz: Any, one_hertz: Any) -> None:
     """One sample of every instrument that is due into `m`, and the true air data and load factor into `o`."""
     attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
     (fx, fy, fz, _l, _m, _n, airspeed, alpha, beta, _rho, thrust_left, thrust_right,

@@ -282,7 +282,8 @@ def test_the_card_lists_every_channel_with_unit_and_bounds() -> None:
 def test_a_scheduled_row_follows_its_own_clock_after_another_began_anew() -> None:
     changes = {"duration": 3.0, "cloud": [{"time": float(t), "lwc": 1e-4*t, "mvd": 2e-5, "temperature": 268.0}
                                           for t in range(4)]}
-    batch = gym.make_vec("icing_env/TwinOtter-v0", num_envs=2, changes=changes, autoreset_mode="Disabled", mode="targets")
+    options = {"num_envs": 2, "changes": changes, "autoreset_mode": "Disabled", "mode": "targets"}
+    batch = gym.make_vec("icing_env/TwinOtter-v0", **options)
     batch.reset(seed=40)
     alone = make(changes=changes, mode="targets")
     alone.reset(seed=41)

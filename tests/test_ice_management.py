@@ -104,9 +104,8 @@ def test_temperature_decides_boots_and_heat(celsius, boots, heat):
     c = np.zeros(1, COMMAND)
     ice_management.operate(c, a)
     assert c[0]["boots_tail"] == boots and c[0]["prop_heat"] == heat
-    c["boots_wing"] = 1
     ice_management.operate(c, ice_management.init(1))
-    assert c[0]["boots_wing"] == 1  # what the crew switched on stays on
+    assert not c[0]["boots_wing"] and not c[0]["boots_tail"] and not c[0]["prop_heat"]  # off with the all-clear
 
 
 def test_limits_tighten_with_severity():
