@@ -1,7 +1,7 @@
 """Test inputs: doublets and their sets, added to whatever the controls do.
 
 A doublet set is two elevator doublets, one aileron and one rudder doublet (founding paper). Amplitudes give about
-0.25 g (elevator), 20 deg/s of roll and 6 deg of sideslip at 72 m/s, as in the flight records.
+0.3 g (elevator), 20 deg/s of roll and 6 deg of sideslip at 72 m/s, as in the flight records.
 """
 
 from __future__ import annotations
