@@ -33,7 +33,7 @@ it again.
 """
 COMMANDS = (
     ("icing fly {hold} --seed 3 --out hold.csv", "fly the hold, write its record and the truth beside it"),
-    ("icing fly {hold} --seed 3 --no-protection", "the same cloud and gusts without protection"),
+    ("icing fly {hold} --seed 3 --no-protection", "the same hold without protection"),
     ("icing fly clear_air --effect tail_ice --out iced.csv", "two doublet sets with ice on the tail"),
     ("icing identify iced.csv --method hinf", "what the observer finds in that record"),
     ("icing diagnose {folder}/blind.csv --held-out {folder}/blind_held_out.csv --out diagnosis",
@@ -58,7 +58,7 @@ for step in range(3000):                         # one minute at 50 Hz
     total += reward
     if step % 500 == 0:
         seen = dict(zip(names, observation))
-        print(f"{step/50:4.0f} s  {seen['airspeed']:.1f} m/s  excess drag {seen['excess_drag']:.4f}")
+        print(f"{step/50:4.0f} s  {seen['airspeed']:.1f} m/s  drag +{seen['excess_drag']:.4f}")
     if terminated or truncated:
         break
 print("sum of rewards", round(total, 1))

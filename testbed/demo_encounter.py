@@ -136,6 +136,7 @@ def _of_the_observer(e: Encounter) -> list[Verdict]:
     when = detected_at(e.protected)
     if when is None:
         return [drag, Verdict("Ice was not declared in the protected flight.", "info")]
+    inflations = e.protected.truth["boot_cycles"][-1]
     row = int(np.searchsorted(e.protected.truth["time"], when))
     return [drag, Verdict(f"Ice was declared {when/MINUTE:.1f} min into the hold, at {truth[row]/COUNT:.0f} counts of "
-                          "excess drag; from then on the boots were cycled every three minutes.", "info")]
+                          f"excess drag; the boots inflated {inflations:.0f} times from then on.", "info")]

@@ -81,7 +81,8 @@ def moments(e: Encounter) -> list[tuple[str, Flight, float]]:
         (f"With protection, {first/MINUTE:.1f} min: {why}.", e.protected, first),
         (f"With protection, {before/MINUTE:.1f} min: the limits have moved in and the boots are cycling.", e.protected,
          before),
-        (f"Without protection, {before/MINUTE:.1f} min, {lost}: nobody acts on the estimate, and no limit is drawn.",
+        (f"Without protection, {before/MINUTE:.1f} min, {lost}. The ice management is off, and its panel at rest: "
+         "CLEAR, no severity, no limits. The estimates below it are there, but nobody acts on them.",
          e.unprotected, before),
     ]  # fmt: skip
 

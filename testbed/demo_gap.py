@@ -122,8 +122,8 @@ def write(report: Report, b: Blind) -> None:
     report.figure(gap_bars(gap.by_channel(energy.before), gap.by_channel(energy.after),
                            gap.by_channel(energy.alone.mean(axis=0))),
                   "The held-out record against the simulator, flown freely in windows of ten seconds, before and after "
-                  "the diagnosis is built in. One tolerance is what 14 CFR 60 lets a simulator be off; those of α, ax and "
-                  "ay are assumed.")
+                  "the diagnosis is built in. One tolerance is what 14 CFR 60 lets a simulator be off; those of α, ax "
+                  "and ay are assumed.")
     described = {e["name"]: e for e in b.found.effects}
     rows: list[list[Cell]] = [[_label(h), 100.0*h["probability"], _size(described.get(_only(h)))]
                               for h in b.found.hypotheses[:LISTED]]
