@@ -48,7 +48,9 @@ def air_data(x: Any, attitude: tuple, s: Any, p: Any) -> tuple:
     Inertial velocity less wind less gust; `attitude`: the direction cosines.
     """
     north, east, down = wind(x.altitude, p)
-    wx, wy, wz = to_body(attitude, north, east, down)
+    wx, wy, wz = 0.0, 0.0, 0.0
+    if north != 0.0 or east != 0.0 or down != 0.0:  # in still air the rotation would cost a twentieth of a step
+        wx, wy, wz = to_body(attitude, north, east, down)
     ua, va, wa = x.u - wx - s.gust_u, x.v - wy - s.gust_v, x.w - wz - s.gust_w
     plane = math.sqrt(ua*ua + wa*wa)
     airspeed = math.sqrt(plane*plane + va*va)
@@ -62,15 +64,27 @@ def air_data(x: Any, attitude: tuple, s: Any, p: Any) -> tuple:
 
 
 @kernel
-def forces(x: Any, attitude: tuple, s: Any, c: Any, p: Any) -> tuple:
-    """Aerodynamic and propulsive force [N] and moment about the c.g. [N m], and what instruments and controls need.
-
-    Returns: Fx, Fy, Fz, L, M, N, airspeed, alpha, beta, density, thrust left, thrust right, elevator and aileron hinge
-    moments, static pressure.
-    """
+def meet_air(x: Any, attitude: tuple, s: Any, c: Any, p: Any) -> tuple:
+    """The air that the aircraft meets: density [kg/m3], static pressure [Pa], and what `air_data` returns."""
     kelvin, static = static_air_near(x.altitude, c.standard_pressure, c.per_standard_temperature)
     density = p.density_factor*static/(GAS_CONSTANT*(kelvin + p.temperature_offset))
-    airspeed, alpha, beta, sine, cosine, ua, va, wa, slowness = air_data(x, attitude, s, p)
+    return (density, static, *air_data(x, attitude, s, p))
+
+
+@kernel
+def forces(x: Any, attitude: tuple, s: Any, c: Any, p: Any) -> tuple:
+    """`loads` in the air that the aircraft meets."""
+    return loads(x, meet_air(x, attitude, s, c, p), s, c, p)
+
+
+@kernel
+def loads(x: Any, air: tuple, s: Any, c: Any, p: Any) -> tuple:
+    """Aerodynamic and propulsive force [N] and moment about the c.g. [N m], and what instruments and controls need.
+
+    `air`: of `meet_air`. Returns: Fx, Fy, Fz, L, M, N, airspeed, alpha, beta, density, thrust left, thrust right,
+    elevator and aileron hinge moments, static pressure.
+    """
+    density, static, airspeed, alpha, beta, sine, cosine, ua, va, wa, slowness = air
     qbar = 0.5*density*airspeed*airspeed
     half = 0.5*slowness
     pa, qa, ra = x.p - s.gust_p, x.q - s.gust_q, x.r - s.gust_r
@@ -162,8 +176,14 @@ def controls_and_engines(x: Any, dx: Any, u: Any, hinge_e: float, hinge_a: float
 def derivative(x: Any, dx: Any, s: Any, c: Any, p: Any, u: Any) -> None:
     """Rates of the whole continuous state, written into `dx`."""
     attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
+    rates(x, dx, attitude, meet_air(x, attitude, s, c, p), s, c, p, u)
+
+
+@kernel
+def rates(x: Any, dx: Any, attitude: tuple, air: tuple, s: Any, c: Any, p: Any, u: Any) -> None:
+    """Rates of the whole continuous state in known air (of `meet_air`), written into `dx`."""
     (fx, fy, fz, roll, pitch, yaw, airspeed, alpha, _beta, _density, _left, _right,
-     hinge_e, hinge_a, static) = forces(x, attitude, s, c, p)
+     hinge_e, hinge_a, static) = loads(x, air, s, c, p)
     rigid_body(x, attitude, dx, fx, fy, fz, roll, pitch, yaw, c, p)
     controls_and_engines(x, dx, u, hinge_e, hinge_a, static, c, p)
     dx.alpha_downwash = (alpha - x.alpha_downwash)*max(airspeed, AIRSPEED_FLOOR)*c.per_tail_arm

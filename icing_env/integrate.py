@@ -1,8 +1,8 @@
 """The classical fourth-order Runge-Kutta step of the continuous state (Press et al., Numerical Recipes, section 17.1).
 
-A few aircraft advance together, stage by stage: the equations of one are a long chain of dependent operations, and the
-processor fills some of its waiting time with those of the next (measured: 1 to 4 % faster than one after another, the
-more the better the data fit the cache). Each aircraft's arithmetic is the same in any company.
+A few aircraft advance together, phase by phase (the air they meet, the rates, the sums): the equations of one are a
+long chain of dependent operations, and the processor fills waiting time with those of the next (measured: a step of
+eight together takes 6 to 12 % less than one after another). Each aircraft's arithmetic is the same in any company.
 
 The equations name the fields of records; the weighted sums run over the same memory as rows of numbers, in vectors.
 """
@@ -15,13 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from icing_env.dynamics import derivative
+from icing_env.dynamics import meet_air, rates
+from icing_env.frames import direction_cosines
 from icing_env.jit import kernel
 from icing_env.types import N_CONTINUOUS
 
 TOGETHER = 8  # aircraft that advance side by side
-START, TRIAL, SLOPE, TOTAL = 0, 1, 2, 3  # the records of one aircraft
 STAGES = 4
+START, TRIAL, SLOPE, TOTAL, AIR = 0, 1, 2, 3, 4  # the records of one aircraft; AIR holds what `meet_air` returns
+RECORDS = 5
 AHEAD = (0.5, 0.5, 1.0, 0.0)  # where the next slope is taken, in steps
 WEIGHT = (1.0/6.0, 1.0/3.0, 1.0/3.0, 1.0/6.0)
 
@@ -43,6 +45,19 @@ def move(row: Any, ahead: float, weight: float, size: int) -> None:
         slope = row[n + SLOPE*N_CONTINUOUS]
         row[n + TOTAL*N_CONTINUOUS] += weight*slope
         row[n + TRIAL*N_CONTINUOUS] = row[n + START*N_CONTINUOUS] + ahead*slope
+
+
+@kernel
+def store(row: Any, air: tuple) -> None:
+    """Put the numbers of `meet_air` away."""
+    for n in range(len(air)):
+        row[n] = air[n]
+
+
+@kernel
+def recall(row: Any) -> tuple:
+    """The numbers of `meet_air` that `store` put away."""
+    return row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9], row[10]
 
 
 @kernel
@@ -85,18 +100,23 @@ def rk4(stage: Any, numbers: Any, first: int, count: int, state: Any, current: A
         command: Any, dt: float) -> None:
     """Advance `count` aircraft from row `first` by `dt`; gusts, ice and commands are held.
 
-    `stage` [TOGETHER, STAGES]: the continuous state goes in and comes out in TRIAL; the rest is scratch.
-    `numbers` [TOGETHER, STAGES*N_CONTINUOUS]: the same memory, as `numbers_of` gives it.
+    `stage` [TOGETHER, RECORDS]: the continuous state goes in and comes out in TRIAL; the rest is scratch.
+    `numbers` [TOGETHER, RECORDS*N_CONTINUOUS]: the same memory, as `numbers_of` gives it.
     """
-    size = numbers.shape[1]//STAGES
+    size, air = numbers.shape[1]//RECORDS, numbers[:, AIR*N_CONTINUOUS:]
     for j in range(count):
         put(numbers[j], START, TRIAL, size)
         put(numbers[j], TOTAL, TRIAL, size)
     for k in range(STAGES):
         for j in range(count):
-            i = first + j
-            derivative(stage[j, TRIAL], stage[j, SLOPE], state[i], current[i], parameters[0 if shared else i],
-                       command[i])
+            i, x = first + j, stage[j, TRIAL]
+            attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
+            store(air[j], meet_air(x, attitude, state[i], current[i], parameters[0 if shared else i]))
+        for j in range(count):
+            i, x = first + j, stage[j, TRIAL]
+            attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
+            rates(x, stage[j, SLOPE], attitude, recall(air[j]), state[i], current[i], parameters[0 if shared else i],
+                  command[i])
         for j in range(count):
             move(numbers[j], AHEAD[k]*dt, WEIGHT[k]*dt, size)
     for j in range(count):

@@ -5,15 +5,14 @@ multiplication and exclusive or on a counter of four words, keyed by two. Here t
 counter is (block, stream, low word of step, high word of step). A draw therefore depends on nothing that was drawn
 before: batch size, the order of calls and which subsystems are on change no other draw.
 
-Normal deviates come from one 32-bit uniform each by Acklam's rational approximation of the inverse normal distribution
-function (P. J. Acklam, "An algorithm for computing the inverse normal cumulative distribution function", 2003):
-relative error below 1.2e-9, tails to 6.3 sigma, no logarithm for 95 % of the draws.
+Normal deviates come from one 32-bit uniform each by a rational approximation of the inverse normal distribution
+function: the tails of P. J. Acklam, "An algorithm for computing the inverse normal cumulative distribution function"
+(2003), and a centre of fewer terms. Relative error below 1e-6, tails to 6.3 sigma, no logarithm for 98 % of the draws.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -58,7 +57,7 @@ def philox(c0: Word, c1: Word, c2: Word, c3: Word, k0: Word, k1: Word) -> tuple[
 
 
 @kernel
-def words4(seed: Any, stream: Any, step: Any, block: Any) -> tuple[Word, Word, Word, Word]:
+def words4(seed: int, stream: int, step: int, block: int) -> tuple[Word, Word, Word, Word]:
     """Four random 32-bit words (as uint64) of one (seed, stream, step, block), all integers >= 0."""
     key, time = np.uint64(seed), np.uint64(step)
     return philox(np.uint64(block), np.uint64(stream), time & _MASK, time >> _HALF, key & _MASK, key >> _HALF)
@@ -74,14 +73,15 @@ def uniform(word: Word) -> float:
 def normal(u: float) -> float:
     """Standard normal deviate with distribution value `u` in (2^-34, 1 - 2^-34): Acklam 2003.
 
-    A rational function of (u - 1/2)^2 for 95 % of the draws, one of sqrt(-2 log(tail)) for the rest.
+    The centre, 98 % of the draws, is a rational function of (u - 1/2)^2, fitted here for the least largest relative
+    error (7e-7, Lawson's iteration); the tails are Acklam's, in sqrt(-2 log(tail)).
     """
     q = u - 0.5
-    if abs(q) <= 0.47575:
+    if abs(q) <= 0.49:
         r = q * q
-        above = (((-39.69683028665376 * r + 220.9460984245205) * r - 275.9285104469687) * r + 138.3577518672690) * r
-        below = (((-54.47609879822406 * r + 161.5858368580409) * r - 155.6989798598866) * r + 66.80131188771972) * r
-        return q * ((above - 30.66479806614716) * r + 2.506628277459239) / ((below - 13.28068155288572) * r + 1.0)
+        above = (((40.7745758371 * r - 124.266887975) * r + 92.8701538615) * r - 26.1083996812) * r + 2.50663005455
+        below = (((42.9482545195 * r - 78.2983729052) * r + 46.7452510119) * r - 11.4627976783) * r + 1.0
+        return q * above / below
     r = math.sqrt(-2.0 * math.log(0.5 - abs(q)))
     above = ((-0.007784894002430293 * r - 0.3223964580411365) * r - 2.400758277161838) * r - 2.549732539343734
     below = ((0.007784695709041462 * r + 0.3224671290700398) * r + 2.445134137142996) * r + 3.754408661907416
@@ -89,14 +89,14 @@ def normal(u: float) -> float:
 
 
 @kernel
-def uniform4(seed: Any, stream: Any, step: Any, block: Any) -> tuple[float, float, float, float]:
+def uniform4(seed: int, stream: int, step: int, block: int) -> tuple[float, float, float, float]:
     """Four independent uniform deviates in (0, 1)."""
     a, b, c, d = words4(seed, stream, step, block)
     return uniform(a), uniform(b), uniform(c), uniform(d)
 
 
 @kernel
-def normal4(seed: Any, stream: Any, step: Any, block: Any) -> tuple[float, float, float, float]:
+def normal4(seed: int, stream: int, step: int, block: int) -> tuple[float, float, float, float]:
     """Four independent standard normal deviates."""
     a, b, c, d = words4(seed, stream, step, block)
     return normal(uniform(a)), normal(uniform(b)), normal(uniform(c)), normal(uniform(d))

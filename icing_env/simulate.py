@@ -20,7 +20,7 @@ from icing_env.cloud import advance_cloud
 from icing_env.dynamics import air_data, present_aircraft
 from icing_env.frames import direction_cosines
 from icing_env.ice_protection import advance_protection
-from icing_env.integrate import STAGES, TOGETHER, TRIAL, copy, numbers_of, rk4
+from icing_env.integrate import RECORDS, TOGETHER, TRIAL, copy, numbers_of, rk4
 from icing_env.jit import bound, entry, kernel
 from icing_env.parameters import PARAMETERS
 from icing_env.sensors import hold_filter_constants, read_instruments, start_instruments
@@ -123,7 +123,7 @@ class Fleet:
         self.outcome = np.zeros(n, OUTCOME)
         bounds = np.linspace(0, n, min(threads, n) + 1).astype(int)
         self._slices = [slice(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
-        self._stages = [np.zeros((TOGETHER, STAGES), CONTINUOUS) for _ in self._slices]
+        self._stages = [np.zeros((TOGETHER, RECORDS), CONTINUOUS) for _ in self._slices]
         self._pool = ThreadPoolExecutor(len(self._slices)) if len(self._slices) > 1 else None
         self._bind()
 
