@@ -13,6 +13,7 @@ function: the tails of P. J. Acklam, "An algorithm for computing the inverse nor
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -57,7 +58,7 @@ def philox(c0: Word, c1: Word, c2: Word, c3: Word, k0: Word, k1: Word) -> tuple[
 
 
 @kernel
-def words4(seed: int, stream: int, step: int, block: int) -> tuple[Word, Word, Word, Word]:
+def words4(seed: Any, stream: Any, step: Any, block: Any) -> tuple[Word, Word, Word, Word]:
     """Four random 32-bit words (as uint64) of one (seed, stream, step, block), all integers >= 0."""
     key, time = np.uint64(seed), np.uint64(step)
     return philox(np.uint64(block), np.uint64(stream), time & _MASK, time >> _HALF, key & _MASK, key >> _HALF)
@@ -71,7 +72,7 @@ def uniform(word: Word) -> float:
 
 @kernel
 def normal(u: float) -> float:
-    """Standard normal deviate with distribution value `u` in (2^-34, 1 - 2^-34): Acklam 2003.
+    """Standard normal deviate with distribution value `u` in (2^-34, 1 - 2^-34).
 
     The centre, 98 % of the draws, is a rational function of (u - 1/2)^2, fitted here for the least largest relative
     error (7e-7, Lawson's iteration); the tails are Acklam's, in sqrt(-2 log(tail)).
@@ -89,14 +90,14 @@ def normal(u: float) -> float:
 
 
 @kernel
-def uniform4(seed: int, stream: int, step: int, block: int) -> tuple[float, float, float, float]:
+def uniform4(seed: Any, stream: Any, step: Any, block: Any) -> tuple[float, float, float, float]:
     """Four independent uniform deviates in (0, 1)."""
     a, b, c, d = words4(seed, stream, step, block)
     return uniform(a), uniform(b), uniform(c), uniform(d)
 
 
 @kernel
-def normal4(seed: int, stream: int, step: int, block: int) -> tuple[float, float, float, float]:
+def normal4(seed: Any, stream: Any, step: Any, block: Any) -> tuple[float, float, float, float]:
     """Four independent standard normal deviates."""
     a, b, c, d = words4(seed, stream, step, block)
     return normal(uniform(a)), normal(uniform(b)), normal(uniform(c)), normal(uniform(d))
