@@ -34,4 +34,4 @@ def test_the_estimator_finds_the_ice_that_the_blind_one_misses() -> None:
 
 def test_training_starts() -> None:
     pytest.importorskip("stable_baselines3", reason="the extra `learning` is not installed")
-    assert "ep_rew_mean" in run("train_ppo.py", "40000")
+    assert "value_loss" in run("train_ppo.py", "20000")

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from icing_env.record import FlightRecord
     from sim2real.diagnosis import Diagnosis
 
-EXAMPLE = """icing fly clear_air --seed 1 --effect elevator_power:change=-0.2 --out flown.csv
-icing fly clear_air --seed 2 --effect elevator_power:change=-0.2 --out other.csv
-icing diagnose flown.csv --held-out other.csv --out out/diagnosis"""
+EXAMPLE = """icing diagnose flown.csv --held-out other.csv --out out/diagnosis
+icing fly clear_air --seed 1 --effect elevator_power:change=-0.2 --out flown.csv
+icing fly clear_air --seed 2 --effect elevator_power:change=-0.2 --out other.csv"""
 RECORDS = click.Path(path_type=Path)
 
 
