@@ -61,6 +61,7 @@ class UnknownFit:
     log_evidence: float
     terms: tuple[tuple[str, float, float], ...]
     misfit: float
+    weights: dict[int, float]
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,17 @@ class Posterior:
     classes: dict[str, tuple[str, ...]]
     reduced: FloatArray
     tempering: float = 1.0  # what the evidence was divided by
+
+    @property
+    def best_weights(self) -> dict[int, float]:
+        """Rows of the most probable explanation beside the model, with their weights."""
+        name = max(self.effects, key=lambda n: self.effects[n], default="")
+        likeliest = max(self.none, self.unknown, self.effects.get(name, 0.0))
+        if likeliest == self.none:
+            return {}
+        if likeliest == self.unknown:
+            return max(self.unknown_fits, key=lambda u: u.log_evidence).weights
+        return self.fits[name].weights
 
     @property
     def least_misfit(self) -> float:
@@ -93,6 +105,28 @@ def reduce(gram: FloatArray, bank: Bank, precision: FloatArray | None = None) ->
     inner = gram[np.ix_(g, g)] / NUISANCE_STEP**2 + (np.eye(len(g)) if precision is None else precision)
     cross = gram[:, g] / NUISANCE_STEP
     return np.asarray(gram - cross @ np.linalg.solve(inner, cross.T))
+
+
+def nuisance_mean(gram: FloatArray, bank: Bank, posterior: Posterior, precision: FloatArray) -> FloatArray:
+    """Nuisances [n], in standard deviations, under the most probable explanation."""
+    weights = {0: 1.0} | posterior.best_weights
+    rows, w = list(weights), np.array(list(weights.values()))
+    g = np.arange(1, 1 + len(bank.nuisances))
+    inner = gram[1 : 1 + len(g), 1 : 1 + len(g)] / NUISANCE_STEP**2 + precision
+    return np.asarray(-np.linalg.solve(inner, gram[g][:, rows] @ w / NUISANCE_STEP), dtype=np.float64)
+
+
+def with_prior(gram: FloatArray, bank: Bank, precision: FloatArray, centre: FloatArray) -> FloatArray:
+    """Inner products with the nuisances' prior counted as data, for a model already moved by `centre`.
+
+    The prior's residual at the model is L' centre with precision = L L', and L' for a step in each direction.
+    """
+    n = len(bank.nuisances)
+    root = np.linalg.cholesky(precision).T
+    data = np.column_stack([root @ centre, NUISANCE_STEP * root])
+    out = gram.copy()
+    out[: n + 1, : n + 1] += data.T @ data
+    return out
 
 
 def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str],
@@ -214,7 +248,8 @@ def fit_unknown(reduced: FloatArray, bank: Bank) -> list[UnknownFit]:
         k = int(np.argmax(logs))
         found = tuple((term.name, float(m), float(e)) for term, m, e in zip(terms, means[k], errors[k], strict=True))
         left = float(reduced[0, 0] - means[k] @ t)
-        out.append(UnknownFit(component, float(logsumexp(logs) - np.log(len(SCALES))), found, left))
+        out.append(UnknownFit(component, float(logsumexp(logs) - np.log(len(SCALES))), found, left,
+                              dict(zip(rows, (float(m) for m in means[k]), strict=True))))
     return out
 
 

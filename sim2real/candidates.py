@@ -22,12 +22,13 @@ from sim2real.channels import LATERAL, MEASURED, TOLERANCE
 from sim2real.predictor import Push
 from sim2real.reconstruct import Reconstruction
 
-# The published sets of derivatives differ by about 5 % where they are well identified; taken as two standard
-# deviations of the model's own uncertainty. A record's mass is known to about 1 % (assumed).
-SPREAD, MASS_SPREAD = 0.025, 0.01
+# The published sets of derivatives differ by about 5 % where they are well identified: the standard deviation of the
+# model's own uncertainty. A record's mass is known to about 1 % (assumed).
+SPREAD, MASS_SPREAD = 0.05, 0.01
 LAG_SPREAD = 0.02  # s, of an actuator's lag that nobody has measured (assumed)
 THRUST_SPREAD = 0.3  # of thrust that was not recorded and is balanced against the model's own drag (assumed)
-NUISANCE_STEP = 2.0  # standard deviations at which the derivative with respect to a nuisance is taken
+FILTER_SPREAD, VANE_SPREAD = 0.1, 0.005  # of the recording's cut-off, and s: channels are in step to a few ms (assumed)
+NUISANCE_STEP = 1.0  # standard deviations at which the derivative with respect to a nuisance is taken
 
 
 @dataclass(frozen=True)
@@ -40,13 +41,21 @@ class Nuisance:
     absolute: bool = False
     only: str = ""  # where the power comes from, if it holds for such records alone
 
-    def apply(self, rows: NDArray, row: int, power_from: str) -> None:
-        """Move one row of PARAMETERS by NUISANCE_STEP standard deviations in this direction."""
+    def apply(self, rows: NDArray, row: int, power_from: str, size: float = NUISANCE_STEP) -> None:
+        """Move one row of PARAMETERS by `size` standard deviations in this direction."""
         if self.only and self.only != power_from:
             return
-        step = NUISANCE_STEP * self.factor
+        step = size * self.factor
         for name in self.parameter.split("+"):
             rows[name][row] = rows[name][row] + step if self.absolute else rows[name][row] * (1.0 + step)
+
+
+def shifted(parameters: NDArray, directions: tuple[Nuisance, ...], sizes: FloatArray, power_from: str) -> NDArray:
+    """One PARAMETERS row moved in every nuisance direction by `sizes` standard deviations."""
+    out = parameters.copy()
+    for nuisance, size in zip(directions, sizes, strict=True):
+        nuisance.apply(out, 0, power_from, float(size))
+    return out
 
 
 @dataclass(frozen=True)
@@ -81,11 +90,13 @@ class Bank:
 
 
 def nuisances() -> tuple[Nuisance, ...]:
-    """Every derivative by `SPREAD`, the mass by `MASS_SPREAD`, the actuators' lags, and thrust where it was guessed."""
+    """Every derivative by `SPREAD`, the mass, the actuators' lags, the timing of channels, and guessed thrust."""
     derivatives = [Nuisance(name, name, SPREAD) for name in DERIVATIVE_NAMES]
     lags = [Nuisance(f"{s}_lag", f"{s}_lag", LAG_SPREAD, True) for s in ("elevator", "aileron", "rudder")]
     guessed = Nuisance("thrust", "thrust_factor_left+thrust_factor_right", THRUST_SPREAD, only="balance")
-    return (*derivatives, Nuisance("mass", "mass", MASS_SPREAD), *lags, guessed)
+    timing = (Nuisance("filter_frequency", "filter_frequency", FILTER_SPREAD),
+              Nuisance("vane_lag", "vane_lag", VANE_SPREAD, True))
+    return (*derivatives, Nuisance("mass", "mass", MASS_SPREAD), *lags, guessed, *timing)
 
 
 def nodes(parameter: Parameter) -> tuple[float, ...]:
@@ -140,7 +151,8 @@ GENERIC: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("y_force", "v", ("1", "beta", "p", "r", "rudder", "alpha*beta", "time")),
     ("rolling_moment", "p", ("1", "beta", "p", "r", "aileron", "rudder", "alpha*beta", "time")),
     ("yawing_moment", "r", ("1", "beta", "p", "r", "aileron", "rudder", "alpha*beta", "time")),
-    *((f"sensor:{c}", c, ("1", c, f"{c}_dot", "time")) for c in MEASURED[:12]),
+    *((f"sensor:{c}", c, ("1", c, f"{c}_dot", "time")) for c in MEASURED[:8]),
+    *((f"sensor:{c}", c, ("1", c, "time")) for c in MEASURED[8:12]),
 )
 # One standard deviation of a generic coefficient with a time course of unit size (assumed: a quarter of the change
 # that typical effects of the library make).

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,19 +14,19 @@ from numpy.typing import NDArray
 from icing_env import aircraft, effects
 from icing_env.errors import InputError, nearest
 from icing_env.jit import source_hash
-from icing_env.record import DataProblem, FlightRecord, FloatArray
+from icing_env.record import DataProblem, FlightRecord
 from sim2real import gap
-from sim2real.attribution import P_NONE, P_UNKNOWN, Posterior, attribute
+from sim2real.attribution import P_NONE, P_UNKNOWN, Posterior
 from sim2real.candidates import SPREAD, Bank, bank, not_testable
-from sim2real.evidence import Evidence, gather
+from sim2real.evidence import Evidence
 from sim2real.manoeuvre import next_manoeuvre
 from sim2real.reconstruct import Reconstruction, reconstruct
 from sim2real.references import Baseline, fit_baseline
+from sim2real.weigh import Progress, fit
 from sim2real.where import components, describe_unknown, regimes
 from sim2real.windows import FREE, cut
 
 LISTED = 0.01  # effects at least this probable are described one by one
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -93,12 +93,8 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         baseline = fit_baseline([reconstruct(r) for r in reference], candidates)
     flights = [reconstruct(r, baseline.parameters) for r in records]
     others = [reconstruct(r, baseline.parameters) for r in held_out]
-    evidences = []
-    for i, flight in enumerate(flights, start=1):
-        progress(f"flying {candidates.size} variants along record {i} of {len(flights)}")
-        evidences.append(gather(flight, candidates))
     untestable = not_testable(flights, candidates)
-    posterior = weigh(evidences, candidates, untestable, baseline)
+    evidences, posterior = fit(flights, candidates, untestable, baseline, progress)
     progress("flying the records freely, before and after")
     verdict, hypotheses = judge(posterior)
     change = remedy(verdict, posterior)
@@ -129,47 +125,6 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         seconds=time.perf_counter() - began,
         details=Details(tuple(flights), tuple(others), tuple(evidences), posterior, change, training, tested),
     )
-
-
-def weigh(evidences: Sequence[Evidence], candidates: Bank, untestable: dict[str, str],
-          baseline: Baseline) -> Posterior:
-    """Posterior of all records together; effects whose whole range would not show are added to `untestable`."""
-    gram = np.sum([e.gram for e in evidences], axis=0)
-    posterior = attribute(gram, candidates, tuple(untestable), baseline.precision)
-    tempering = temper(posterior.least_misfit, evidences)
-    if tempering > 1.0:
-        gram = gram / tempering
-        posterior = attribute(gram, candidates, tuple(untestable), baseline.precision)
-    posterior = replace(posterior, tempering=tempering)
-    quiet = [name for name, fit in posterior.fits.items() if fit.smallest is None]
-    for name in quiet:
-        untestable[name] = "no excitation: these records would not show it anywhere in its range"
-    if not quiet:
-        return posterior
-    return replace(attribute(gram, candidates, tuple(untestable), baseline.precision), tempering=tempering)
-
-
-def temper(misfit: float, evidences: Sequence[Evidence]) -> float:
-    """What to divide the evidence by because even the best explanation leaves more than noise, and that coloured.
-
-    With the mean whitened square c of what is left over and the correlation time tau of the innovations (in samples):
-    1 + (c - 1) tau, and 1 where c is below one. Model error that nobody can name is thus counted as noise, instead of
-    as thousands of independent proofs of whatever lies nearest.
-    """
-    excess = misfit / sum(e.samples for e in evidences) - 1.0
-    return 1.0 + max(excess, 0.0) * float(np.mean([correlation_time(e.whitened) for e in evidences]))
-
-
-def correlation_time(series: FloatArray) -> float:
-    """Samples in which innovations stay correlated [N, channels], the channels weighted by their energy."""
-    n = len(series)
-    spectrum = np.abs(np.fft.rfft(series, 2 * n, axis=0)) ** 2
-    together = np.fft.irfft(spectrum.sum(axis=1), 2 * n)[:n]
-    if together[0] <= 0.0:
-        return 1.0
-    rho = together / together[0]
-    below = np.flatnonzero(rho < 0.05)
-    return float(1.0 + 2.0 * np.sum(rho[1 : below[0] if len(below) else n]))
 
 
 def ranked(posterior: Posterior) -> list[tuple[str, float]]:

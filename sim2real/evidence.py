@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from icing_env.record import FloatArray
 from sim2real.candidates import Bank, parameter_rows, pushes
 from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR
+from sim2real.kalman import Gain, gains
 from sim2real.paths import path_residuals
-from sim2real.predictor import Gain, gains, held, innovations
+from sim2real.predictor import held, innovations
 from sim2real.reconstruct import Reconstruction
 
 SIGMAS = (0.02, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.5, 2.2, 3.2)  # m/s

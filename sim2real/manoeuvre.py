@@ -17,7 +17,8 @@ from sim2real.attribution import INDISTINGUISHABLE, reduce
 from sim2real.candidates import Bank
 from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR
 from sim2real.evidence import SETTLE, whiten
-from sim2real.predictor import Predictor, gains, innovations, put
+from sim2real.kalman import gains
+from sim2real.predictor import Predictor, innovations, put
 from sim2real.reconstruct import Reconstruction
 
 DURATION = 30.0  # s

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from icing_env.frames import direction_cosines, to_body
 from icing_env.record import FloatArray
 from icing_env.simulate import Fleet
-from icing_env.turbulence import pair_noise, scales
 from icing_env.types import MEASUREMENT, STATE
 from sim2real.channels import FED_BACK, MEASURED, SURFACES
 from sim2real.reconstruct import Reconstruction
@@ -31,12 +30,6 @@ ANGLES = ("phi", "theta")  # corrected through the quaternion
 TANGENT = (*STATES, *ANGLES)
 STILL = 1e-12  # m/s: gusts keep their states but draw nothing
 SLOW_SURFACE = 4.0  # a surface's lag in steps: it moves nearly in a straight line from sample to sample
-# What disturbs the states beside gusts, per square root of second: it keeps the filter's memory to a few seconds, so
-# that an error of the start does not last (assumed).
-WALK = {"u": 0.03, "v": 0.03, "w": 0.03, "p": 7e-4, "q": 7e-4, "r": 7e-4, "altitude": 0.05, "phi": 4e-4,
-        "theta": 4e-4}  # fmt: skip
-DOUBLINGS = 16  # 65536 steps
-SURFACE_NOISE = 7.6e-4  # rad, of recorded positions: 0.03 deg (configs/instruments), 1.46 times that unfiltered
 _STATE_COLUMN = {name: i for i, name in enumerate(STATE.names or ())}
 _MEASURED_COLUMN = {name: i for i, name in enumerate(MEASUREMENT.names or ())}
 _X = np.array([_STATE_COLUMN[name] for name in STATES])
@@ -56,15 +49,6 @@ class Push:
     target: str  # u v w p q r: acceleration in m/s2 or rad/s2; or a channel of MEASURED
     series: FloatArray
     sensor: bool  # an error of the channel's reading, not an acceleration
-
-
-@dataclass(frozen=True)
-class Gain:
-    """Steady gain [states, fed-back channels] and innovation covariance of one gust intensity (m/s)."""
-
-    sigma: float
-    K: FloatArray
-    S: FloatArray
 
 
 class Predictor:
@@ -190,79 +174,6 @@ def put(fleet: Fleet, values: Mapping[str, float | FloatArray]) -> None:
     fleet.start()
 
 
-def linearise(flight: Reconstruction) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """A, C of the one-step map about the record's middle, and B for a step of each surface [rad].
-
-    z' = A z, y' = C z with y' the reading at the end of the step.
-    """
-    size = np.full(len(TANGENT), 1e-4)
-    size[[TANGENT.index(n) for n in ("u", "v", "w", "altitude", "pitot")]] = 1e-2
-    size[[i for i, n in enumerate(TANGENT) if n.startswith(("dryden", "gust"))]] = 1e-2
-    n = len(TANGENT)
-    flown = Predictor(flight, np.repeat(flight.parameters, 2 * n + 7))
-    flown.place_typical()
-    change = np.zeros((2 * n + 7, n))
-    change[:n], change[n : 2 * n] = np.diag(size), -np.diag(size)
-    flown.correct(change)
-    for j, surface in enumerate(SURFACES):
-        flown.fleet.state[surface][2 * n + 2 * j] += 1e-3
-        flown.fleet.state[surface][2 * n + 2 * j + 1] -= 1e-3
-    for surface in SURFACES:
-        flown.fleet.command[surface] = flown.fleet.state[surface]
-    flown.fleet.step()
-    y, z = flown.read(), flown.tangent()
-    A = ((z[:n] - z[n : 2 * n]) / (2.0 * size[:, None])).T
-    C = ((y[:n] - y[n : 2 * n]) / (2.0 * size[:, None])).T
-    B = np.stack([(z[2 * n + 2 * j] - z[2 * n + 2 * j + 1]) / 2e-3 for j in range(3)], axis=1)
-    return A, C[:FED_BACK], B
-
-
-def gains(flight: Reconstruction, sigmas: tuple[float, ...]) -> list[Gain]:
-    """Steady gain and innovation covariance for each gust intensity."""
-    A, C, B = linearise(flight)
-    speed, height = float(np.median(flight.channel("airspeed"))), float(np.median(flight.altitude))
-    walk = np.array([WALK.get(name, 1e-6) for name in TANGENT]) ** 2 * flight.dt
-    blank = np.array([not flight.has(name) for name in MEASURED[:FED_BACK]])
-    rate = np.array([max(np.mean(np.isfinite(flight.measured[:, j])), 1e-3) for j in range(FED_BACK)])
-    R = np.diag(np.where(blank, 1e6, flight.noise[:FED_BACK] ** 2 / rate))
-    out = []
-    for sigma in sigmas:
-        Qw = gust_noise(sigma, speed, height, flight.dt)
-        columns = [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
-        G, D = A[:, columns], C[:, columns]
-        Q = G @ Qw @ G.T + np.diag(walk) + SURFACE_NOISE**2 * (B @ B.T)
-        Rt, cross = D @ Qw @ D.T + R, G @ Qw @ D.T
-        out.append(Gain(sigma, *_steady(A, C, Q, Rt, cross)))
-    return out
-
-
-def _steady(
-    A: FloatArray, C: FloatArray, Q: FloatArray, R: FloatArray, cross: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Gain and innovation covariance: the Riccati equation by doubling (Chu, Fan, Lin & Wang, IJC 77, 2004)."""
-    Rinv = np.linalg.inv(R)
-    a, H, G = (A - cross @ Rinv @ C).T, Q - cross @ Rinv @ cross.T, C.T @ Rinv @ C
-    for _ in range(DOUBLINGS):
-        middle = np.linalg.solve(np.eye(len(A)) + G @ H, np.hstack([a, G]))
-        aw, gw = middle[:, : len(A)], middle[:, len(A) :]
-        a, G, H = a @ aw, G + a @ gw @ a.T, H + a.T @ H @ aw
-        G, H = 0.5 * (G + G.T), 0.5 * (H + H.T)
-    S = C @ H @ C.T + R
-    return np.asarray(np.linalg.solve(S, (A @ H @ C.T + cross).T).T, np.float64), S
-
-
-def gust_noise(sigma: float, speed: float, height: float, dt: float) -> FloatArray:
-    """Covariance of what drives dryden_u, v1, v2, w1, w2 over a step [5, 5] (filters of icing_env.turbulence)."""
-    length_uv, length_w, ratio = scales(height)
-    out = np.zeros((5, 5))
-    for first, length, intensity in ((1, length_uv, ratio * sigma), (3, length_w, sigma)):
-        _, l11, l21, l22 = pair_noise(speed * dt / length)
-        factor = intensity * np.array([[l11, 0.0], [l21, l22]])
-        out[first : first + 2, first : first + 2] = factor @ factor.T
-    out[0, 0] = (ratio * sigma * pair_noise(speed * dt / length_uv)[1]) ** 2
-    return out
-
-
 def innovations(flight: Reconstruction, parameters: NDArray, gain: FloatArray,
                 pushes: tuple[Push, ...] = ()) -> NDArray[np.float32]:
     """Measured less predicted of every row [N-1, n, channels], float32; nan where nothing was measured.
@@ -270,7 +181,7 @@ def innovations(flight: Reconstruction, parameters: NDArray, gain: FloatArray,
     Args:
         flight: the record.
         parameters: a PARAMETERS row per variant.
-        gain: K [states, fed-back channels], or one per row [n, ...].
+        gain: K of a `Gain` [steps, states, fed-back channels], or one per row [n, ...]; the last step's goes on.
         pushes: generic discrepancies.
     """
     flown = Predictor(flight, parameters)
@@ -294,7 +205,8 @@ def innovations(flight: Reconstruction, parameters: NDArray, gain: FloatArray,
         left = flight.measured[k + 1] - predicted
         out[k] = left
         fed = np.where(present[k + 1, :FED_BACK], left[:, :FED_BACK], 0.0) * stretch
-        change = fed @ gain.T if gain.ndim == 2 else np.einsum("nsc,nc->ns", gain, fed)
+        now = min(k, gain.shape[-3] - 1)
+        change = fed @ gain[now].T if gain.ndim == 3 else np.einsum("nsc,nc->ns", gain[:, now], fed)
         if forces:
             change[f_row, f_col] += f_series[:, k + 1] * flight.dt
         flown.correct(change)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from icing_env import aircraft
 from icing_env.record import FloatArray
-from sim2real.candidates import NUISANCE_STEP, Bank
+from sim2real.candidates import NUISANCE_STEP, Bank, shifted
 from sim2real.evidence import gather
 from sim2real.reconstruct import Reconstruction
 
@@ -33,11 +33,8 @@ def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank) -> Baselin
     n = len(candidates.nuisances)
     precision = np.eye(n) + gram[1 : n + 1, 1 : n + 1] / NUISANCE_STEP**2
     mean = -np.linalg.solve(precision, gram[1 : n + 1, 0] / NUISANCE_STEP)
-    row = aircraft.load()
-    for nuisance, size in zip(candidates.nuisances, mean, strict=True):
-        if nuisance.name in ("mass", "thrust"):
-            continue  # a matter of each record
-        change = size * nuisance.factor
-        row[nuisance.parameter] = row[nuisance.parameter] + change if nuisance.absolute else (
-            row[nuisance.parameter] * (1.0 + change))
-    return Baseline(row, precision)
+    for j, nuisance in enumerate(candidates.nuisances):
+        if nuisance.name in ("mass", "thrust"):  # a matter of each record
+            mean[j], precision[j], precision[:, j] = 0.0, 0.0, 0.0
+            precision[j, j] = 1.0
+    return Baseline(shifted(aircraft.load(), candidates.nuisances, mean, ""), precision)

@@ -1,0 +1,141 @@
+"""The gain that corrects the predictor: Kalman's, for the plant linearised about a record and one gust intensity.
+
+The plant is linearised by differences of its own one-step map, gust filters and instruments included. Gusts act within
+the step whose end is measured, so that process and measurement noise are correlated (Anderson & Moore, Optimal
+Filtering, section 5.4). The first seconds have gains of their own, from the uncertainty of the start.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from icing_env.record import FloatArray
+from icing_env.turbulence import pair_noise, scales
+from sim2real.channels import FED_BACK, MEASURED, SURFACES
+from sim2real.predictor import TANGENT, Predictor
+from sim2real.reconstruct import Reconstruction
+
+# What disturbs the states beside gusts, per square root of second: it keeps the filter's memory to a few seconds, so
+# that an error of the start does not last (assumed).
+WALK = {"u": 0.03, "v": 0.03, "w": 0.03, "p": 7e-4, "q": 7e-4, "r": 7e-4, "altitude": 0.05, "phi": 4e-4,
+        "theta": 4e-4}  # fmt: skip
+TRANSIENT = 10.0  # s with gains of their own after the start
+DOUBLINGS = 16  # 65536 steps
+SURFACE_NOISE = 7.6e-4  # rad, of recorded positions: 0.03 deg (configs/instruments), 1.46 times that unfiltered
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Gain and innovation covariance for one gust intensity.
+
+    Attributes:
+        sigma: m/s.
+        K: of the first steps, then the steady one [steps, states, fed-back channels].
+        S: covariance of the steady innovations.
+    """
+
+    sigma: float
+    K: FloatArray
+    S: FloatArray
+
+
+def linearise(flight: Reconstruction) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """A, C of the one-step map about the record's middle, and B for a step of each surface [rad].
+
+    z' = A z, y' = C z with y' the reading at the end of the step.
+    """
+    size = np.full(len(TANGENT), 1e-4)
+    size[[TANGENT.index(n) for n in ("u", "v", "w", "altitude", "pitot")]] = 1e-2
+    size[[i for i, n in enumerate(TANGENT) if n.startswith(("dryden", "gust"))]] = 1e-2
+    n = len(TANGENT)
+    flown = Predictor(flight, np.repeat(flight.parameters, 2 * n + 7))
+    flown.place_typical()
+    change = np.zeros((2 * n + 7, n))
+    change[:n], change[n : 2 * n] = np.diag(size), -np.diag(size)
+    flown.correct(change)
+    for j, surface in enumerate(SURFACES):
+        flown.fleet.state[surface][2 * n + 2 * j] += 1e-3
+        flown.fleet.state[surface][2 * n + 2 * j + 1] -= 1e-3
+    for surface in SURFACES:
+        flown.fleet.command[surface] = flown.fleet.state[surface]
+    flown.fleet.step()
+    y, z = flown.read(), flown.tangent()
+    A = ((z[:n] - z[n : 2 * n]) / (2.0 * size[:, None])).T
+    C = ((y[:n] - y[n : 2 * n]) / (2.0 * size[:, None])).T
+    B = np.stack([(z[2 * n + 2 * j] - z[2 * n + 2 * j + 1]) / 2e-3 for j in range(3)], axis=1)
+    return A, C[:FED_BACK], B
+
+
+def gains(flight: Reconstruction, sigmas: tuple[float, ...]) -> list[Gain]:
+    """Steady gain and innovation covariance for each gust intensity."""
+    A, C, B = linearise(flight)
+    speed, height = float(np.median(flight.channel("airspeed"))), float(np.median(flight.altitude))
+    walk = np.array([WALK.get(name, 1e-6) for name in TANGENT]) ** 2 * flight.dt
+    blank = np.array([not flight.has(name) for name in MEASURED[:FED_BACK]])
+    rate = np.array([max(np.mean(np.isfinite(flight.measured[:, j])), 1e-3) for j in range(FED_BACK)])
+    R = np.diag(np.where(blank, 1e6, flight.noise[:FED_BACK] ** 2 / rate))
+    out = []
+    for sigma in sigmas:
+        Qw = gust_noise(sigma, speed, height, flight.dt)
+        columns = [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
+        G, D = A[:, columns], C[:, columns]
+        Q = G @ Qw @ G.T + np.diag(walk) + SURFACE_NOISE**2 * (B @ B.T)
+        Rt, cross = D @ Qw @ D.T + R, G @ Qw @ D.T
+        steady, S = _steady(A, C, Q, Rt, cross)
+        first = _transient(A, C, Q, Rt, cross, _start_covariance(sigma), round(TRANSIENT / flight.dt))
+        out.append(Gain(sigma, np.concatenate([first, steady[None]]), S))
+    return out
+
+
+def _steady(
+    A: FloatArray, C: FloatArray, Q: FloatArray, R: FloatArray, cross: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Gain and innovation covariance: the Riccati equation by doubling (Chu, Fan, Lin & Wang, IJC 77, 2004)."""
+    Rinv = np.linalg.inv(R)
+    a, H, G = (A - cross @ Rinv @ C).T, Q - cross @ Rinv @ cross.T, C.T @ Rinv @ C
+    for _ in range(DOUBLINGS):
+        middle = np.linalg.solve(np.eye(len(A)) + G @ H, np.hstack([a, G]))
+        aw, gw = middle[:, : len(A)], middle[:, len(A) :]
+        a, G, H = a @ aw, G + a @ gw @ a.T, H + a.T @ H @ aw
+        G, H = 0.5 * (G + G.T), 0.5 * (H + H.T)
+    S = C @ H @ C.T + R
+    return np.asarray(np.linalg.solve(S, (A @ H @ C.T + cross).T).T, np.float64), S
+
+
+def _transient(A: FloatArray, C: FloatArray, Q: FloatArray, R: FloatArray, cross: FloatArray, P: FloatArray,
+               steps: int) -> FloatArray:
+    """Gains of the first steps from the covariance `P` of the start [steps, states, channels]."""
+    out = np.empty((steps, len(A), len(C)))
+    for k in range(steps):
+        S = C @ P @ C.T + R
+        out[k] = np.linalg.solve(S, (A @ P @ C.T + cross).T).T
+        P = A @ P @ A.T - out[k] @ S @ out[k].T + Q
+        P = 0.5 * (P + P.T)
+    return out
+
+
+def _start_covariance(sigma: float) -> FloatArray:
+    """How well a quarter of a second of measurements gives the start: gusts pass for motion through the air."""
+    gust = sigma + 0.3
+    size = {"u": gust, "v": gust, "w": gust, "p": 0.02, "q": 0.02, "r": 0.02, "altitude": 1.0, "alpha_downwash": 0.02,
+            "pitot": 0.3, "vane_alpha": 0.01, "vane_beta": 0.01, "phi": 0.003, "theta": 0.003}  # fmt: skip
+    for name in TANGENT:
+        if name.startswith(("dryden", "gust")):
+            size[name] = sigma + 1e-3
+        elif name.startswith("filtered"):
+            size[name] = 1.0 if name[-2:] in ("ax", "ay", "az") else 0.02
+    return np.diag([size[name] ** 2 for name in TANGENT])
+
+
+def gust_noise(sigma: float, speed: float, height: float, dt: float) -> FloatArray:
+    """Covariance of what drives dryden_u, v1, v2, w1, w2 over a step [5, 5] (filters of icing_env.turbulence)."""
+    length_uv, length_w, ratio = scales(height)
+    out = np.zeros((5, 5))
+    for first, length, intensity in ((1, length_uv, ratio * sigma), (3, length_w, sigma)):
+        _, l11, l21, l22 = pair_noise(speed * dt / length)
+        factor = intensity * np.array([[l11, 0.0], [l21, l22]])
+        out[first : first + 2, first : first + 2] = factor @ factor.T
+    out[0, 0] = (ratio * sigma * pair_noise(speed * dt / length_uv)[1]) ** 2
+    return out
