@@ -6,6 +6,8 @@ Everyone sees measurements, estimates and the clean aircraft's numbers; nobody s
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,7 +52,8 @@ class ClosedLoop:
         self._estimate = bound(hinf.step, self.observer, estimate, measurement, self.airframe, self.tuning, dt)
         self._manage = bound(ice_management.step, advisory, estimate, measurement, self.clean, self.management_tuning,
                              dt)
-        self._steer = bound(autopilot.step, self.autopilot, command, measurement, self.target, advisory, self.gains, dt)
+        self._steer: Callable[[], None] | None = None  # compiled when first wanted: surfaces alone need no autopilot
+        self._command = command
         self._operate = bound(ice_management.operate, command, advisory)
         self._protect = bound(envelope_protection.protect, command, advisory, measurement, estimate, self.clean,
                               self.limits, dt)
@@ -74,6 +77,9 @@ class ClosedLoop:
 
     def steer(self) -> None:
         """Fly the targets."""
+        if self._steer is None:
+            self._steer = bound(autopilot.step, self.autopilot, self._command, self.measurement, self.target,
+                                self.advisory, self.gains, self.dt)
         self._steer()
 
     def protect(self) -> None:
