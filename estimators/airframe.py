@@ -9,7 +9,7 @@ import numpy as np
 
 from icing_env.configuration import read_toml
 from icing_env.errors import InputError
-from icing_env.types import DERIVATIVE_NAMES, Field, structured
+from icing_env.types import DERIVATIVE_NAMES, Field, structured, unit_of
 
 AIRFRAME_FIELDS: list[Field] = [
     ("wing_area", "m2", "reference area"),
@@ -20,7 +20,7 @@ AIRFRAME_FIELDS: list[Field] = [
     ("inertia_yy", "kg m2", "about body y"),
     ("inertia_zz", "kg m2", "about body z"),
     ("inertia_xz", "kg m2", "+ integral of x z dm"),
-    *((name, "1" if name.endswith("_0") else "1/rad", "clean aircraft") for name in DERIVATIVE_NAMES),
+    *((name, unit_of(name), "clean aircraft") for name in DERIVATIVE_NAMES),
     ("CL_flap", "1/rad", "lift of flap"),
     ("CD_flap", "1/rad", "parasite drag of flap"),
     ("Cm_flap", "1/rad", "moment of flap"),

@@ -20,7 +20,7 @@ from estimators.regression import Fit, least_squares
 from estimators.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
-from icing_env.types import ESTIMATE
+from icing_env.types import ESTIMATE, unit_of
 
 METHOD = "H-infinity"
 AXIS = dict(zip(CHANNELS, ("longitudinal",) * 3 + ("lateral",) * 3, strict=True))
@@ -136,7 +136,7 @@ def _estimate(run: History, c: int, i: int, fit: Fit, moved: dict[str, float]) -
         why = "the record says too little about it: its starting value still weighs"
     elif not why and not name.endswith("_0") and not error <= LARGEST_RATIO * abs(value):
         why = f"its standard error {error:.2g} exceeds a third of the estimate {value:.2g}"
-    return Estimate(value, error, "1" if name.endswith("_0") else "1/rad", METHOD, fit.r2, not why, why)
+    return Estimate(value, error, unit_of(name), METHOD, fit.r2, not why, why)
 
 
 def _why_not(name: str, channel: str, moved: dict[str, float]) -> str:

@@ -15,14 +15,14 @@ from __future__ import annotations
 from typing import Any
 
 from icing_env.jit import kernel
-from icing_env.types import DERIVATIVE_NAMES, Field
+from icing_env.types import DERIVATIVE_NAMES, Field, unit_of
 
 AERODYNAMIC_PARAMETERS: list[Field] = [
     ("wing_area", "m2", "reference area"),
     ("span", "m", "wing span"),
     ("chord", "m", "mean aerodynamic chord"),
     ("tail_arm", "m", "c.g. to quarter chord of the tailplane"),
-    *((name, "1" if name.endswith("_0") else "1/rad", "clean value, quasi-steady") for name in DERIVATIVE_NAMES),
+    *((name, unit_of(name), "clean value, quasi-steady") for name in DERIVATIVE_NAMES),
     ("CD_parasite", "1", "drag along the air stream of bluff parts, beyond that in CX_0"),
     ("CY_0", "1", "side force of an asymmetric airframe"),
     ("Cl_0", "1", "rolling moment of an asymmetric airframe"),

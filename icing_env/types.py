@@ -10,6 +10,12 @@ import numpy as np
 
 Field = tuple[str, str, str]  # name, unit, meaning
 
+
+def unit_of(coefficient: str) -> str:
+    """Unit of an aerodynamic coefficient by its name: CX_0 has none, CX_alpha2 goes with the square of an angle."""
+    return "1" if coefficient.endswith("_0") else "1/rad2" if coefficient.endswith("2") else "1/rad"
+
+
 # What the Runge-Kutta step integrates.
 CONTINUOUS_FIELDS: list[Field] = [
     ("north", "m", "position north of the start"),
@@ -171,7 +177,7 @@ DERIVATIVE_NAMES = (
     "Cn_beta", "Cn_p", "Cn_r", "Cn_aileron", "Cn_rudder",
 )  # fmt: skip
 CURRENT_FIELDS: list[Field] = [
-    *((name, "1" if name.endswith("_0") else "1/rad", "value now, ice included") for name in DERIVATIVE_NAMES),
+    *((name, unit_of(name), "value now, ice included") for name in DERIVATIVE_NAMES),
     ("CZ_alpha_left", "1/rad", "lift-curve slope of the left half wing"),
     ("CZ_alpha_right", "1/rad", "lift-curve slope of the right half wing"),
     ("CX_0_left", "1", "axial coefficient of the left half wing"),
@@ -238,8 +244,8 @@ ESTIMATED_NAMES = (
     "Cn_0", "Cn_beta", "Cn_p", "Cn_r", "Cn_aileron", "Cn_rudder",
 )  # fmt: skip
 ESTIMATE_FIELDS: list[Field] = [
-    *((name, "1" if name.endswith("_0") else "1/rad", "estimate") for name in ESTIMATED_NAMES),
-    *((f"{name}_std", "1" if name.endswith("_0") else "1/rad", "its standard error") for name in ESTIMATED_NAMES),
+    *((name, unit_of(name), "estimate") for name in ESTIMATED_NAMES),
+    *((f"{name}_std", unit_of(name), "its standard error") for name in ESTIMATED_NAMES),
     ("excess_drag", "1", "CD_0 above that of the clean aircraft, smoothed for decisions"),
     ("excitation_longitudinal", "1", "share of recent pitch activity that the elevator caused, 0..1"),
     ("excitation_lateral", "1", "share of recent roll and yaw activity that aileron and rudder caused, 0..1"),

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-import os
 import statistics
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 from estimators import equation_error, hinf_record
 from estimators.airframe import published_airframe
@@ -16,21 +14,8 @@ from icing_env.record import FlightRecord, read
 from icing_env.scenario import load
 from testbed.demo_parts import Tell, Verdict
 from testbed.flight import fly
+from testbed.textbook import BOOK, folder
 
-# Klein & Morelli, Aircraft System Identification (AIAA 2006), examples 5.1 and 5.2, and SIDPAC's demonstration on the
-# longitudinal record; as printed, for the digits count.
-BOOK = {
-    "totter_demo_data.mat": {
-        "CZ_alpha": "-6.349", "CZ_q": "-18.41", "CZ_elevator": "-0.626",
-        "Cm_alpha": "-1.4762", "Cm_q": "-36.35", "Cm_elevator": "-1.8688",
-    },
-    "totter_f1_017_data.mat": {
-        "CY_beta": "-0.8451", "CY_r": "0.9631", "CY_rudder": "0.3426",
-        "Cl_beta": "-0.1051", "Cl_p": "-0.5283", "Cl_r": "0.1926", "Cl_aileron": "-0.2117", "Cl_rudder": "0.0299",
-        "Cn_beta": "0.08544", "Cn_p": "-0.05151", "Cn_r": "-0.19758", "Cn_aileron": "0.00234",
-        "Cn_rudder": "-0.13054",
-    },
-}  # fmt: skip
 TITLES = {"totter_demo_data.mat": "NASA record 13 Feb 2002 #18, longitudinal",
           "totter_f1_017_data.mat": "NASA record 14 Feb 2002 #17, lateral"}  # fmt: skip
 PITCH = ("CL_alpha", "CL_q", "CL_elevator", "Cm_alpha", "Cm_q", "Cm_elevator")
@@ -82,12 +67,6 @@ class Identified:
         exact = [abs(self.stored[n].estimate - float(v)) <= 0.51*10.0**-len(v.split(".")[1])
                  for n, v in self.reference.items()]
         return sum(exact), len(exact)
-
-
-def folder() -> Path:
-    """Where recorded flights lie, if anywhere: ICING_FLIGHT_DATA, else shared/flight_data beside the checkout."""
-    beside = Path(__file__).resolve().parents[2] / "shared" / "flight_data"
-    return Path(os.environ.get("ICING_FLIGHT_DATA") or beside)
 
 
 def measure(seed: int, tell: Tell) -> list[Identified]:

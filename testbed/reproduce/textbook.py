@@ -7,34 +7,23 @@ ICING_FLIGHT_DATA names, else in shared/flight_data beside the checkout; the row
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 
 from estimators import equation_error, hinf_record
 from estimators.estimate import Estimate
 from icing_env.record import read
 from testbed.reproduce.row import Row, Rule, row
+from testbed.textbook import BOOK as PRINTED
+from testbed.textbook import folder
 
 ITEM = "textbook"
 DIGITS = Rule(relative=0.002)
 CLOSE = Rule(relative=0.05)
-LATERAL = {"CY_beta": -0.8451, "CY_r": 0.9631, "CY_rudder": 0.3426, "Cl_beta": -0.1051, "Cl_p": -0.5283,
-           "Cl_r": 0.1926, "Cl_aileron": -0.2117, "Cl_rudder": 0.0299, "Cn_beta": 0.08544, "Cn_p": -0.05151,
-           "Cn_r": -0.19758, "Cn_aileron": 0.00234, "Cn_rudder": -0.13054}  # fmt: skip
-PITCH = {"CZ_alpha": -6.349, "CZ_q": -18.41, "CZ_elevator": -0.626, "Cm_alpha": -1.4762, "Cm_q": -36.35,
-         "Cm_elevator": -1.8688}  # fmt: skip
-BOOK = {"totter_f1_017_data.mat": LATERAL, "totter_demo_data.mat": PITCH}
+BOOK = {name: {key: float(value) for key, value in PRINTED[name].items()} for name in reversed(PRINTED)}
 COLUMNS = ("the book regresses on the smoothed columns that the record's owner stored; on the raw channels with "
            "matched filters the record says otherwise, by least squares and by H-infinity alike")
-
-
-def folder() -> Path:
-    """Where recorded flights lie, if anywhere."""
-    return Path(os.environ.get("ICING_FLIGHT_DATA")
-                or Path(__file__).resolve().parents[3] / "shared" / "flight_data")
 
 
 def rows(seed: int) -> list[Row]:
