@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.data_checks import check
-from estimators.resample import common_grid
+from estimators.signals.data_checks import check
+from estimators.signals.resample import common_grid
 from icing_env import aircraft
 from icing_env.atmosphere import density, pressure, static_air
 from icing_env.errors import InputError

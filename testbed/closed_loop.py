@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers import autopilot, envelope_protection, ice_management
-from estimators import hinf, hinf_memory, hinf_tuning
+from estimators import hinf
 from estimators.airframe import airframe_from
-from estimators.hinf_rows import PARAMETER_NAMES
+from estimators.hinf import memory as hinf_memory
+from estimators.hinf import tuning as hinf_tuning
+from estimators.hinf.rows import PARAMETER_NAMES
 from icing_env.jit import bound
 from icing_env.types import ESTIMATE, ESTIMATED_NAMES, TARGET
 

@@ -7,9 +7,10 @@ import statistics
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from estimators import equation_error, hinf_record
 from estimators.airframe import published_airframe
 from estimators.estimate import Estimate
+from estimators.hinf import record as hinf_record
+from estimators.regression import equation_error
 from icing_env.record import FlightRecord, read
 from icing_env.scenario import load
 from testbed.demo_parts import Tell, Verdict

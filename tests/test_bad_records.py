@@ -11,8 +11,8 @@ from flights import PITCH, flight_data, lateral, longitudinal
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimators.data_checks import check
-from estimators.equation_error import identify
+from estimators.regression.equation_error import identify
+from estimators.signals.data_checks import check
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, read, write
 

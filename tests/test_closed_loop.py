@@ -13,7 +13,7 @@ from controllers import autopilot, envelope_protection, ice_management
 from estimators.airframe import airframe_from
 from estimators.hinf import init
 from estimators.hinf import step as observe
-from estimators.hinf_tuning import default_tuning
+from estimators.hinf.tuning import default_tuning
 from icing_env import aircraft
 from icing_env.simulate import Fleet
 from icing_env.trim import trim

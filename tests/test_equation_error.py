@@ -10,12 +10,12 @@ from flights import LATERAL, META, PITCH, V, flight_data, lateral, longitudinal
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimators.coefficients import Airframe, airframe_of
-from estimators.data_checks import check
-from estimators.differentiate import low_pass, matched_kernel, slope, smooth
-from estimators.equation_error import identify
-from estimators.regression import correlation, least_squares
-from estimators.stepwise import stepwise
+from estimators.regression.equation_error import identify
+from estimators.regression.least_squares import correlation, least_squares
+from estimators.regression.stepwise import stepwise
+from estimators.signals.coefficients import Airframe, airframe_of
+from estimators.signals.data_checks import check
+from estimators.signals.differentiate import low_pass, matched_kernel, slope, smooth
 from icing_env.errors import InputError
 from icing_env.record import read
 

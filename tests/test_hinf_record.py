@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from flights import flight_data
 
-from estimators import hinf_record
-from estimators.equation_error import identify as equation_error
+from estimators.hinf import record as hinf_record
+from estimators.regression.equation_error import identify as equation_error
 from icing_env.errors import InputError
 from icing_env.record import read
 

@@ -9,9 +9,9 @@ from small_aircraft import controls
 from controllers import autopilot
 from estimators import hinf
 from estimators.airframe import airframe_from
-from estimators.hinf_memory import clean_values
-from estimators.hinf_rows import PARAMETER_NAMES
-from estimators.hinf_tuning import default_tuning
+from estimators.hinf.memory import clean_values
+from estimators.hinf.rows import PARAMETER_NAMES
+from estimators.hinf.tuning import default_tuning
 from icing_env import aircraft
 from icing_env.simulate import Fleet
 from icing_env.trim import trim

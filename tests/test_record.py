@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.io import savemat
 
-from estimators.coefficients import dynamic_pressure
+from estimators.signals.coefficients import dynamic_pressure
 from icing_env.errors import InputError
 from icing_env.record import COLUMNS, FlightRecord, RecordMeta, read, write
 from icing_env.types import MEASUREMENT_FIELDS

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from estimators.methods import METHODS, method
 from testbed.commands.common import print_json, print_table, verb
 
 if TYPE_CHECKING:
@@ -21,20 +22,20 @@ icing identify doublet1.csv doublet2.csv --method hinf --start 0.4 --json"""
 
 @verb("identify", EXAMPLE)
 @click.argument("records", nargs=-1, required=True, metavar="RECORD...", type=click.Path(path_type=Path))
-@click.option("--method", type=click.Choice(["stepwise", "hinf"]), default="stepwise", show_default=True,
+@click.option("--method", "name", type=click.Choice(list(METHODS)), default="stepwise", show_default=True,
               help="Equation error, or the recursive H-infinity observer run once over the record.")  # fmt: skip
 @click.option("--mode", type=click.Choice(["matched", "textbook"]), default="matched", show_default=True,
               help="Equation error: our filters on raw channels, or the columns that the owner stored.")  # fmt: skip
 @click.option("--start", type=click.FloatRange(min=0.0, min_open=True), default=1.0, show_default=True,
               help="H-infinity: factor on the published model at which the estimates start.")  # fmt: skip
-def command(records: tuple[Path, ...], method: str, mode: str, start: float, as_json: bool, seed: int) -> None:
+def command(records: tuple[Path, ...], name: str, mode: str, start: float, as_json: bool, seed: int) -> None:
     """Estimate aerodynamic derivatives from flight records (.csv, .parquet, SIDPAC's .mat), per rad.
 
     A derivative that a record does not excite is refused, with the reason, rather than guessed. With several
     records each is identified alone; the derivatives are then their mean weighted by inverse variance, its error
     widened where they scatter more than their errors allow. Nothing is drawn at random; --seed changes nothing.
     """
-    found = {str(path): identify(path, method, mode, start) for path in records}
+    found = {str(path): identify(path, name, mode, start) for path in records}
     result = answer(found)
     if as_json:
         print_json(result)
@@ -49,20 +50,18 @@ def command(records: tuple[Path, ...], method: str, mode: str, start: float, as_
         click.echo(f"record   {problem['record']}: {problem['channel']} {problem['kind']}")
 
 
-def identify(path: Path, method: str, mode: str, start: float) -> tuple[dict[str, Estimate], FlightRecord]:
+def identify(path: Path, name: str, mode: str, start: float) -> tuple[dict[str, Estimate], FlightRecord]:
     """Estimates by name from one record, and the record as checked.
 
     Raises:
         InputError: the record cannot be read or used.
     """
-    from estimators import equation_error, hinf_record
-    from estimators.data_checks import check
+    from estimators.signals.data_checks import check
     from icing_env.record import read
 
     record = check(read(path))
-    if method == "hinf":
-        return hinf_record.identify(record, start=start), record
-    return equation_error.identify(record, mode), record
+    options: dict[str, dict[str, Any]] = {"stepwise": {"mode": mode}, "hinf": {"start": start}}
+    return method(name)(record, **options.get(name, {})), record
 
 
 def answer(found: Mapping[str, tuple[dict[str, Estimate], FlightRecord]]) -> dict[str, Any]:

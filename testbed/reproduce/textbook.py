@@ -11,8 +11,9 @@ import sys
 from collections.abc import Mapping
 from dataclasses import replace
 
-from estimators import equation_error, hinf_record
 from estimators.estimate import Estimate
+from estimators.hinf import record as hinf_record
+from estimators.regression import equation_error
 from icing_env.record import read
 from testbed.reproduce.row import Row, Rule, row
 from testbed.textbook import BOOK as PRINTED

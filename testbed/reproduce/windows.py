@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators import equation_error, hinf_record
 from estimators.estimate import Estimate
+from estimators.hinf import record as hinf_record
+from estimators.regression import equation_error
 from icing_env.atmosphere import G0
 from icing_env.manoeuvres import Doublet, doublet_set
 from icing_env.record import FlightRecord

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from estimators.hinf_rows import PARAMETER_NAMES
+from estimators.hinf.rows import PARAMETER_NAMES
 from icing_env.configuration import folder
 from icing_env.errors import InputError, nearest
 

@@ -18,13 +18,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from estimators.hinf_channel import filter_step, forget, learn
-from estimators.hinf_excitation import excite, gate, shares
-from estimators.hinf_memory import ACCELEROMETER, COUNT, DIAGONAL, FIRST, OBSERVER, PACKED, init
-from estimators.hinf_rows import clean_zero_lift_drag, force_rows, moment_rows, readable
+from estimators.hinf.channel import filter_step, forget, learn
+from estimators.hinf.excitation import excite, gate, shares
+from estimators.hinf.memory import ACCELEROMETER, COUNT, DIAGONAL, FIRST, PACKED
+from estimators.hinf.rows import clean_zero_lift_drag, force_rows, moment_rows, readable
 from icing_env.jit import entry, kernel
-
-__all__ = ["OBSERVER", "init", "step"]
 
 
 @kernel

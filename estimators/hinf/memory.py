@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from estimators.airframe import airframe_from
-from estimators.hinf_rows import PARAMETER_NAMES
+from estimators.hinf.rows import PARAMETER_NAMES
 
 # First parameter and number of parameters of each channel in PARAMETER_NAMES, first element of its packed B3.
 FIRST = (0, 1, 5, 9, 14, 20)

@@ -2,7 +2,7 @@
 
 Two modes. `matched` differentiates the raw rates and passes every regressor through the smoother that belongs to the
 slope filter. `textbook` takes the angular accelerations, coefficients and hat rates that the record's owner stored,
-which is where the printed values of Klein & Morelli's examples come from. Equations: estimators.equations.
+which is where the printed values of Klein & Morelli's examples come from. Equations: estimators.regression.equations.
 """
 
 from __future__ import annotations
@@ -10,7 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.coefficients import (
+from estimators.estimate import Estimate
+from estimators.regression.equations import EQUATIONS, NEEDED, SURFACES, Equation, fit_equation, movement
+from estimators.signals.coefficients import (
     Airframe,
     airframe_of,
     body_forces,
@@ -21,11 +23,9 @@ from estimators.coefficients import (
     products,
     thrust,
 )
-from estimators.data_checks import check
-from estimators.differentiate import half_width, slope, smooth
-from estimators.equations import EQUATIONS, NEEDED, SURFACES, Equation, fit_equation, movement
-from estimators.estimate import Estimate
-from estimators.resample import Grid, common_grid
+from estimators.signals.data_checks import check
+from estimators.signals.differentiate import half_width, slope, smooth
+from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimators.regression import Fit, correlation, least_squares
+from estimators.regression.least_squares import Fit, correlation, least_squares
 from icing_env.errors import InputError, nearest
 from icing_env.record import FloatArray
 

@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators import hinf
-from estimators.coefficients import thrust
-from estimators.data_checks import check
-from estimators.equations import EXCITED, LARGEST_RATIO, SURFACES, movement
 from estimators.estimate import Estimate
-from estimators.hinf_measurements import absent, airframe_of_record, measurements
-from estimators.hinf_memory import ACCELEROMETER, COUNT, DIAGONAL, FIRST
-from estimators.hinf_rows import PARAMETER_NAMES
-from estimators.hinf_tuning import CHANNELS, default_tuning
-from estimators.regression import Fit, least_squares
-from estimators.resample import Grid, common_grid
+from estimators.hinf.measurements import absent, airframe_of_record, measurements
+from estimators.hinf.memory import ACCELEROMETER, COUNT, DIAGONAL, FIRST
+from estimators.hinf.rows import PARAMETER_NAMES
+from estimators.hinf.tuning import CHANNELS, default_tuning
+from estimators.regression.equations import EXCITED, LARGEST_RATIO, SURFACES, movement
+from estimators.regression.least_squares import Fit, least_squares
+from estimators.signals.coefficients import thrust
+from estimators.signals.data_checks import check
+from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
 from icing_env.types import ESTIMATE, unit_of

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from estimators.differentiate import half_width, slope, smooth
-from estimators.resample import common_grid
+from estimators.signals.differentiate import half_width, slope, smooth
+from estimators.signals.resample import common_grid
 from icing_env.errors import InputError
 from icing_env.record import DataProblem, FlightRecord, FloatArray
 from icing_env.record.table import check_radians

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.estimate import Estimate
-from estimators.regression import Fit, correlation, least_squares
+from estimators.regression.least_squares import Fit, correlation, least_squares
 from icing_env.record import FloatArray
 
 EXCITED = np.radians(0.25)  # rms of a surface about its trend below which it has not moved (assumed)

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.airframe import airframe_from, published_airframe
-from estimators.coefficients import dynamic_pressure
-from estimators.equations import NEEDED
-from estimators.hinf_rows import GAS_CONSTANT
-from estimators.resample import Grid
+from estimators.hinf.rows import GAS_CONSTANT
+from estimators.regression.equations import NEEDED
+from estimators.signals.coefficients import dynamic_pressure
+from estimators.signals.resample import Grid
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord
 from icing_env.types import MEASUREMENT

@@ -1,0 +1,1 @@
+"""Estimates by linear regression: equation error and what it may contain."""

@@ -1,0 +1,1 @@
+"""Recorded channels made ready: checked, put on one time grid, smoothed, differentiated, as coefficients."""
