@@ -1,0 +1,242 @@
+"""Maximum likelihood by Gauss-Newton steps, for any model that simulates many parameter sets in one call.
+
+The measurements are the model's output plus noise of unknown constant variance per channel, R. Its best value for given
+parameters is the mean square of the residual, so that the cost J = 1/2 sum v'R^-1 v + 1/2 sum ln det R becomes
+1/2 sum_j N_j (1 + ln R_jj); a step taken with R held and then judged by this cost is the usual alternation.
+Sensitivities S = dy/dtheta are central differences, all in one batched call; g = sum S'R^-1 v, M = sum S'R^-1 S,
+dtheta = M^-1 g. Source: Klein & Morelli, Aircraft System Identification (AIAA 2006), chapter 6; Jategaonkar, Flight
+Vehicle System Identification (AIAA 2006), chapter 4. Converged means all criteria at once: |dtheta| below 1e-3 of
+theta (or 1e-5), |dJ/J| below 1e-3, |dR/R| below 0.05, and the gradient below 0.05, here measured as the length of the
+remaining step in standard errors, sqrt(g' M^-1 g), so that no unit enters (assumed).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+
+from icing_env.errors import InputError
+from icing_env.record import FloatArray
+
+Simulate = Callable[[FloatArray], FloatArray]
+
+LARGEST_CHANGE, SMALLEST_CHANGE = 1e-3, 1e-5  # of theta: relative, or in its own unit
+COST_CHANGE, NOISE_CHANGE, GRADIENT = 1e-3, 0.05, 0.05
+ALIKE = 1e-10  # eigenvalue of the scaled information, over the largest, below which a direction is not seen
+HALVINGS = 8
+
+
+@dataclass(frozen=True)
+class MaximumLikelihood:
+    """What a fit ended with.
+
+    Attributes:
+        theta: (p,) best parameters.
+        covariance: (p, p) corrected for coloured residuals.
+        covariance_white: (p, p) Cramer-Rao bound, M^-1.
+        noise: (k,) variance R of the residual, per channel.
+        residual: (N, k) measured minus model; 0 where nothing was measured.
+        sensitivity: (N, k, p) dy/dtheta.
+        cost: J.
+        converged: all criteria were met; `reason` says how it ended in any case.
+        full_rank: every direction of theta is seen.
+        iterations: number of steps taken.
+    """
+
+    theta: FloatArray
+    covariance: FloatArray
+    covariance_white: FloatArray
+    noise: FloatArray
+    residual: FloatArray
+    sensitivity: FloatArray
+    cost: float
+    converged: bool
+    reason: str
+    full_rank: bool
+    iterations: int
+
+    @property
+    def std_error(self) -> FloatArray:
+        """Standard errors corrected for coloured residuals, shape (p,)."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlation of the parameters by the Cramer-Rao covariance, shape (p, p)."""
+        scale = np.sqrt(np.maximum(np.diag(self.covariance_white), 1e-300))
+        return np.asarray(self.covariance_white / np.outer(scale, scale), dtype=np.float64)
+
+
+def fit(
+    simulate: Simulate,
+    theta0: FloatArray,
+    measured: FloatArray,
+    *,
+    step: FloatArray | None = None,
+    floor: FloatArray | None = None,
+    lags: int | None = None,
+    most: int = 50,
+) -> MaximumLikelihood:
+    """Parameters under which `measured` is likeliest.
+
+    Args:
+        simulate: outputs (m, N, k) of parameter sets (m, p); a set that cannot be flown gives values that are not
+            finite, and is avoided.
+        theta0: (p,) start.
+        measured: (N, k); nan where a channel was not sampled.
+        step: (p,) half width of the central differences; 1 % of theta by default, 1e-4 where theta is small.
+        floor: (k,) smallest standard deviation of a residual; 1e-9 of a channel's rms by default.
+        lags: largest lag of the residual's autocorrelation in the corrected covariance; a tenth of N by default.
+        most: largest number of steps.
+
+    Raises:
+        InputError: the model cannot be flown from `theta0`, or no channel holds a value.
+    """
+    problem = _Problem(simulate, measured, floor)
+    theta = np.array(theta0, dtype=np.float64)
+    reason, converged, change, iterations = f"no convergence in {most} steps", False, np.inf, 0
+    cost, noise, last, last_noise = np.inf, np.ones(measured.shape[1]), np.inf, np.ones(measured.shape[1])
+    while True:
+        residual, sensitivity = problem.expand(theta, step)
+        noise = problem.noise(residual[None])[0]
+        cost = float(problem.costs(residual[None])[0])
+        information, gradient = _normal_equations(sensitivity, residual, noise)
+        inverse, full_rank = inverse_information(information)
+        move = inverse @ gradient
+        left = float(np.sqrt(max(gradient @ move, 0.0)))
+        settled = bool(np.max(np.abs(noise - last_noise) / noise) < NOISE_CHANGE)
+        if change < 1.0 and abs(cost - last) < COST_CHANGE * abs(cost) and settled and left < GRADIENT:
+            converged, reason = True, f"converged in {iterations} steps"
+            break
+        if iterations >= most:
+            break
+        taken = problem.shorten(theta, move, cost)
+        if taken is None:
+            # Nothing along the step is better: at the bottom up to rounding, or stuck.
+            converged = left < GRADIENT
+            reason = f"converged in {iterations} steps" if converged else "stopped: no step reduces the cost"
+            break
+        change = float(np.max(np.abs(taken - theta) / np.maximum(LARGEST_CHANGE * np.abs(theta), SMALLEST_CHANGE)))
+        theta, last, last_noise, iterations = taken, cost, noise, iterations + 1
+    return MaximumLikelihood(
+        theta=theta,
+        covariance=coloured_covariance(inverse, sensitivity, residual, noise, problem.present, lags),
+        covariance_white=inverse,
+        noise=noise,
+        residual=residual,
+        sensitivity=sensitivity,
+        cost=cost,
+        converged=converged and full_rank,
+        reason=reason if full_rank else f"{reason}; some parameters cannot be told apart",
+        full_rank=full_rank,
+        iterations=iterations,
+    )
+
+
+class _Problem:
+    """Residuals, their cost and their sensitivities."""
+
+    def __init__(self, simulate: Simulate, measured: FloatArray, floor: FloatArray | None) -> None:
+        self.simulate = simulate
+        self.present = np.isfinite(measured)
+        self.count = self.present.sum(axis=0)
+        if not self.count.all():
+            raise InputError("maximum likelihood: a channel to be fitted holds no value")
+        self.measured = np.where(self.present, measured, 0.0)
+        rms = np.sqrt(np.sum(self.measured**2, axis=0) / self.count)
+        least = np.maximum(1e-9 * rms, 1e-12) if floor is None else np.asarray(floor, dtype=np.float64)
+        self.least = least**2
+
+    def residuals(self, thetas: FloatArray) -> FloatArray:
+        """Measured minus model, (m, N, k)."""
+        return np.where(self.present, self.measured - self.simulate(thetas), 0.0)
+
+    def noise(self, residuals: FloatArray) -> FloatArray:
+        """Mean squares of residuals (m, N, k), not below the floor: (m, k)."""
+        return np.maximum(np.sum(residuals**2, axis=1) / self.count, self.least)
+
+    def costs(self, residuals: FloatArray) -> FloatArray:
+        """J of residuals (m, N, k) with R at its best: (m,); infinite where the model did not fly."""
+        squares = np.sum(residuals**2, axis=1)
+        noise = np.maximum(squares / self.count, self.least)
+        cost = 0.5 * np.sum(squares / noise + self.count * np.log(noise), axis=1)
+        return np.where(np.isfinite(cost), cost, np.inf)
+
+    def expand(self, theta: FloatArray, step: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+        """Residual (N, k) at theta and sensitivities (N, k, p) about it."""
+        width = np.maximum(0.01 * np.abs(theta), 1e-4) if step is None else np.asarray(step, dtype=np.float64)
+        p = len(theta)
+        thetas = np.concatenate((theta[None], theta + np.diag(width), theta - np.diag(width)))
+        residuals = self.residuals(thetas)
+        if not np.isfinite(residuals).all():
+            raise InputError("maximum likelihood: the model cannot be flown with these parameters; start elsewhere")
+        slopes = (residuals[1 + p :] - residuals[1 : 1 + p]) / (2.0 * width[:, None, None])
+        return residuals[0], np.ascontiguousarray(np.moveaxis(slopes, 0, 2))
+
+    def shorten(self, theta: FloatArray, move: FloatArray, cost: float) -> FloatArray | None:
+        """The first of the halved steps that lowers the cost; None if none does."""
+        full = theta + move
+        if self.costs(self.residuals(full[None]))[0] < cost:
+            return np.asarray(full, dtype=np.float64)
+        thetas = theta + move * 0.5 ** np.arange(1, HALVINGS)[:, None]
+        better = np.flatnonzero(self.costs(self.residuals(thetas)) < cost)
+        return thetas[better[0]] if len(better) else None
+
+
+def _normal_equations(
+    sensitivity: FloatArray, residual: FloatArray, noise: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Information M (p, p) and S'R^-1 v (p,)."""
+    columns = (sensitivity / np.sqrt(noise)[:, None]).reshape(-1, sensitivity.shape[2])
+    return columns.T @ columns, columns.T @ (residual / np.sqrt(noise)).ravel()
+
+
+def inverse_information(information: FloatArray) -> tuple[FloatArray, bool]:
+    """Inverse (p, p) of an information matrix over the directions that it holds, and whether it holds them all."""
+    scale = np.sqrt(np.maximum(np.diag(information), 0.0))
+    seen = scale > 0.0
+    scale = np.where(seen, scale, 1.0)
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    kept = values > ALIKE * max(values[-1], 1e-300)
+    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
+    return np.asarray(inverse / np.outer(scale, scale), dtype=np.float64), bool(kept.all() and seen.all())
+
+
+def coloured_covariance(
+    inverse: FloatArray,
+    sensitivity: FloatArray,
+    residual: FloatArray,
+    noise: FloatArray,
+    present: np.ndarray,
+    lags: int | None = None,
+) -> FloatArray:
+    """Covariance (p, p) that holds when residuals are coloured and channels go together.
+
+    M^-1 {sum_ij S(i)'R^-1 Rvv(i-j) R^-1 S(j)} M^-1 with the correlations Rvv of all channels, by FFT (Klein & Morelli,
+    section 6.3). Rvv fades linearly to zero at `lags`: with all lags the sum sees the residual only where the fit has
+    already taken its share out, and errors come out a fifth too small even in white noise (0.78 of the bound, measured
+    on 200 records). No error is let below the Cramer-Rao bound. Rows without a measurement carry no weight.
+    """
+    n = len(residual)
+    size = next_fast_len(2 * n, real=True)
+    spectrum = rfft(residual, size, axis=0)
+    cross = np.conj(spectrum)[:, :, None] * spectrum[:, None, :]
+    lags = max(n // 10, 1) if lags is None else lags
+    far = np.minimum(np.arange(size), size - np.arange(size))
+    fade = np.maximum(1.0 - far / (lags + 1.0), 0.0)
+    cross = rfft(irfft(cross, size, axis=0) * fade[:, None, None], axis=0)
+    weighted = rfft(np.where(present[:, :, None], sensitivity / noise[:, None], 0.0), size, axis=0)
+    fold = np.full(len(cross), 2.0)  # the other half of the spectrum of a real signal
+    fold[0] = 1.0
+    if size % 2 == 0:
+        fold[-1] = 1.0
+    count = np.sqrt(np.outer(present.sum(axis=0), present.sum(axis=0)))
+    left = np.conj(weighted).transpose(0, 2, 1) @ (np.conj(cross) / count * (fold / size)[:, None, None])
+    middle = np.real(np.tensordot(left, weighted, axes=([0, 2], [0, 1])))
+    covariance = inverse @ (0.5 * (middle + middle.T)) @ inverse
+    bound, found = np.diag(inverse), np.diag(covariance)
+    lift = np.sqrt(np.maximum(bound / np.maximum(found, 1e-300), 1.0))
+    return np.asarray(covariance * np.outer(lift, lift), dtype=np.float64)
