@@ -1,145 +1,160 @@
-"""Equation error: aerodynamic derivatives from a flight record by least squares.
+"""Equation error: aerodynamic derivatives from a flight record by least squares and modified stepwise regression.
 
-Two modes. `matched` differentiates the raw rates and passes every regressor through the smoother that belongs to the
-slope filter. `textbook` takes the angular accelerations, coefficients and hat rates that the record's owner stored,
-which is where the printed values of Klein & Morelli's examples come from. Equations: estimators.regression.equations.
+Every equation has its linear terms; products of them then compete for a place by modified stepwise regression, so that
+a linear derivative is not bent by a curve that it has to stand for. What stands in the equations, and how signals are
+smoothed and differentiated: estimators.regression.preparation. Equations: estimators.regression.equations.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimators.estimate import Estimate
-from estimators.regression.equations import EQUATIONS, NEEDED, SURFACES, Equation, fit_equation, movement
-from estimators.signals.coefficients import (
-    Airframe,
-    airframe_of,
-    body_forces,
-    dynamic_pressure,
-    hat_rates,
-    lift_drag,
-    moment_coefficients,
-    products,
-    thrust,
+from estimators.regression.equations import (
+    EQUATIONS,
+    EXCITED,
+    NEEDED,
+    SURFACES,
+    Equation,
+    competing,
+    fit_equation,
+    movement,
 )
+from estimators.regression.preparation import prepare
+from estimators.regression.stepwise import PRACTICE, Criteria, Stepwise, stepwise
+from estimators.signals.coefficients import Airframe, airframe_of, thrust
 from estimators.signals.data_checks import check
-from estimators.signals.differentiate import half_width, slope, smooth
 from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
 
-MODES = ("matched", "textbook")
+
+@dataclass(frozen=True)
+class Problem:
+    """A record as equations: `data` by name (N,), usable `rows` by target (N,), rms movement of surfaces (rad)."""
+
+    data: Mapping[str, FloatArray]
+    rows: Mapping[str, NDArray[np.bool_]]
+    moved: Mapping[str, float]
+    thrust_known: bool
+
+    @property
+    def equations(self) -> tuple[Equation, ...]:
+        """The equations that the record has the channels for."""
+        return tuple(equation for equation in EQUATIONS if equation.target in self.rows)
+
+    def flown(self, equation: Equation) -> bool:
+        """Whether a surface of the equation's axis moved: without it products of noise and drift would compete."""
+        return max(self.moved.get(surface, 0.0) for surface in SURFACES[equation.axis]) >= EXCITED
 
 
-def identify(record: FlightRecord, mode: str = "matched", default: Airframe | None = None) -> dict[str, Estimate]:
+def identify(
+    record: FlightRecord,
+    mode: str = "matched",
+    default: Airframe | None = None,
+    nonlinear: bool | None = None,
+    half: int | None = None,
+) -> dict[str, Estimate]:
     """Derivatives by name (CZ_alpha, CL_alpha, CD_0, Cm_q, CY_beta, Cl_p, Cn_rudder ..., per rad; biases as *_0).
 
     An axis whose channels are absent is left out; a derivative that the record does not excite is carried with
     `identifiable` false and the reason. Forces and moments are in the owner's or the record's own signs and units.
 
     Args:
-        mode: "matched" or "textbook".
+        mode: "matched", "fourier", "textbook", "unmatched" or "unmatched_smoothed" (`preparation`).
         default: the airframe for what the record does not state.
+        nonlinear: whether products of the regressors compete; not in the mode "textbook", whose structure is linear,
+            and otherwise, by default.
+        half: samples either side in the slope filter; 0.1 s by default.
 
     Raises:
         InputError: the record is refused by `data_checks.check`, or lacks the channels of both axes or of the mode.
     """
-    if mode not in MODES:
-        raise InputError(f"identify: mode '{mode}' is unknown; valid are: {', '.join(MODES)}")
+    problem = pose(record, mode, default, half)
+    compete = mode != "textbook" if nonlinear is None else nonlinear
+    result: dict[str, Estimate] = {}
+    for equation in problem.equations:
+        data, rows = dict(problem.data), problem.rows[equation.target]
+        entered: tuple[str, ...] = ()
+        if compete:
+            terms = competing(equation, data, rows) if problem.flown(equation) else {}
+            data.update(terms)
+            model = _search(equation, data, terms, rows).terms if terms else ()
+            entered = tuple(term for term in model if term in terms)
+        found = fit_equation(equation, data, rows, dict(problem.moved), f"equation error, {mode}", entered)
+        result.update(without_thrust(found, equation, problem.thrust_known))
+    return result
+
+
+def histories(
+    record: FlightRecord,
+    mode: str = "matched",
+    default: Airframe | None = None,
+    criteria: Criteria = PRACTICE,
+) -> dict[str, Stepwise]:
+    """How stepwise regression built the model of each coefficient (CZ, CL, Cm, CY, Cl, Cn); `.table()` prints one.
+
+    Only coefficients of an axis that was flown. Textbook structure is linear: there the history is what would enter.
+
+    Arguments and errors as for `identify`.
+    """
+    problem = pose(record, mode, default)
+    found = {}
+    for equation in problem.equations:
+        rows = problem.rows[equation.target]
+        terms = competing(equation, dict(problem.data), rows)
+        if terms and problem.flown(equation):
+            found[equation.target] = _search(equation, {**problem.data, **terms}, terms, rows, criteria)
+    return found
+
+
+def _search(
+    equation: Equation,
+    data: Mapping[str, FloatArray],
+    terms: Mapping[str, FloatArray],
+    rows: NDArray[np.bool_],
+    criteria: Criteria = PRACTICE,
+) -> Stepwise:
+    """Stepwise regression on the good rows; the equation's own terms are forced unless optional."""
+    forced = [name for name in equation.regressors if name not in equation.optional]
+    candidates = {name: data[name][rows] for name in (*equation.regressors, *terms)}
+    return stepwise(candidates, data[equation.target][rows], forced, criteria)
+
+
+def pose(record: FlightRecord, mode: str, default: Airframe | None = None, half: int | None = None) -> Problem:
+    """The equations of a record; arguments and errors as for `identify`."""
     record = check(record)
     grid = common_grid(record)
     axes = {axis: [n for n in needed if n not in grid.values] for axis, needed in NEEDED.items()}
     if all(axes.values()):
         lacks = "; ".join(f"{axis} needs {', '.join(names)}" for axis, names in axes.items())
         raise InputError(f"record '{record.meta.name}' lacks columns: {lacks}")
-    airframe = airframe_of(record, default)
-    data, half = _data(grid, airframe) if mode == "matched" else _stored(grid, record, airframe)
+    data, reach = prepare(grid, record, airframe_of(record, default), mode, half)
     surfaces = [name for pair in SURFACES.values() for name in pair if name in grid.values]
     moved = {name: movement(grid.time, grid.values[name], grid.good((name,))) for name in surfaces}
-    result: dict[str, Estimate] = {}
-    for equation in EQUATIONS:
-        if not axes[equation.axis] and equation.target in data:
-            good = _usable(grid, equation, half) & np.isfinite(data[equation.target])
-            found = fit_equation(equation, data, good, moved, f"equation error, {mode}")
-            result.update(_without_thrust(found, equation, thrust(grid.values) is not None))
-    return result
+    rows = {
+        equation.target: _usable(grid, equation, reach) & np.isfinite(data[equation.target])
+        for equation in EQUATIONS if not axes[equation.axis] and equation.target in data
+    }  # fmt: skip
+    return Problem(data, rows, moved, thrust(grid.values) is not None)
 
 
 def _usable(grid: Grid, equation: Equation, half: int) -> NDArray[np.bool_]:
-    """Rows with every channel of the equation known, and none unknown within the reach of the filter."""
+    """Rows with every channel of the equation known, and none unknown or beyond the ends within reach of the filter."""
     bad = ~grid.good((*NEEDED[equation.axis], "ax", "thrust_left", "thrust_right"))
-    if half and bad.any():
+    if half:
         bad = np.convolve(bad, np.ones(2 * half + 1), mode="same") > 0.5
+        bad[:half] = bad[len(bad) - half :] = True
     return ~bad
 
 
-def _without_thrust(found: dict[str, Estimate], equation: Equation, known: bool) -> dict[str, Estimate]:
+def without_thrust(found: dict[str, Estimate], equation: Equation, known: bool) -> dict[str, Estimate]:
     """Refuse drag and axial force where thrust was not recorded: they then contain it."""
     if known or equation.target not in ("CD", "CX"):
         return found
     why = "thrust was not recorded and cannot be told from drag"
     return {n: Estimate(e.estimate, e.std_error, e.unit, e.method, e.r2, False, why) for n, e in found.items()}
-
-
-def _present(values: dict[str, FloatArray], names: tuple[str, ...]) -> dict[str, FloatArray]:
-    """Those of the named channels that are there."""
-    return {name: values[name] for name in names if name in values}
-
-
-def _zeros_for(values: dict[str, FloatArray], names: tuple[str, ...], n: int) -> tuple[FloatArray, ...]:
-    """Channels by name; zero where absent, for small corrections only (inertial coupling, the turn of lift)."""
-    return tuple(values.get(name, np.zeros(n)) for name in names)
-
-
-def _data(grid: Grid, airframe: Airframe) -> tuple[dict[str, FloatArray], int]:
-    """Coefficients and regressors from raw channels, all through matched filters; and the filter's half width."""
-    values, n, half = dict(grid.values), len(grid.time), half_width(grid.dt)
-    p, q, r = _zeros_for(values, ("p", "q", "r"), n)
-    qbar = dynamic_pressure(values)
-    raw = _with_lift(body_forces(values, qbar, airframe), values, n)
-    raw.update(_regressors(values, hat_rates(values, airframe), raw))
-    data = {name: smooth(x, half) for name, x in raw.items()}
-    product = {name: smooth(x, half) for name, x in products(p, q, r).items()}
-    rates_dot = (slope(p, grid.dt, half), slope(q, grid.dt, half), slope(r, grid.dt, half))
-    return {**data, **moment_coefficients(rates_dot, product, smooth(qbar, half), airframe)}, half
-
-
-def _stored(grid: Grid, record: FlightRecord, airframe: Airframe) -> tuple[dict[str, FloatArray], int]:
-    """Coefficients and regressors as the record's owner stored them, unfiltered."""
-    values, n = dict(grid.values), len(grid.time)
-    qbar = dynamic_pressure(values)
-    forces = body_forces(values, qbar, airframe)
-    if not record.meta.corrected:
-        forces.update(_present(values, ("CX", "CY", "CZ")))
-    data = _with_lift(forces, values, n)
-    hats = {**hat_rates(values, airframe), **_present(values, ("p_hat", "q_hat", "r_hat"))}
-    data.update(_regressors(values, hats, data))
-    stored = _present(values, ("Cl", "Cm", "Cn"))
-    if len(stored) < 3:
-        if not all(name in values for name in ("p_dot", "q_dot", "r_dot")):
-            raise InputError(f"record '{record.meta.name}' stores no p_dot, q_dot, r_dot: use the mode 'matched'")
-        rates = _zeros_for(values, ("p", "q", "r"), n)
-        dots = (values["p_dot"], values["q_dot"], values["r_dot"])
-        stored = {**moment_coefficients(dots, products(*rates), qbar, airframe), **stored}
-    return {**data, **stored}, 0
-
-
-def _with_lift(forces: dict[str, FloatArray], values: dict[str, FloatArray], n: int) -> dict[str, FloatArray]:
-    """Add CL and CD where alpha and az are there; without ax, CX is taken as zero in CL and there is no CD."""
-    if "CZ" not in forces or "alpha" not in values:
-        return dict(forces)
-    lift, drag = lift_drag(forces.get("CX", np.zeros(n)), forces["CZ"], values["alpha"])
-    return {**forces, "CL": lift, **({"CD": drag} if "CX" in forces else {})}
-
-
-def _regressors(
-    values: dict[str, FloatArray], hats: dict[str, FloatArray], forces: dict[str, FloatArray]
-) -> dict[str, FloatArray]:
-    """What may stand on the right of an equation."""
-    found = {**_present(values, ("alpha", "beta", "elevator", "aileron", "rudder")), **hats}
-    if "alpha" in values:
-        found["alpha2"] = values["alpha"] ** 2
-    if "CL" in forces:
-        found["CL2"] = forces["CL"] ** 2
-    return found

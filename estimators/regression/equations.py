@@ -6,7 +6,7 @@ parabolic polar CD = CD_0 + CD_K CL^2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,13 +47,36 @@ NEEDED = {
     "longitudinal": ("airspeed", "alpha", "q", "az", "elevator"),
     "lateral": ("airspeed", "beta", "p", "r", "ay", "aileron", "rudder"),
 }
+# Products that may compete with the linear terms, each factor about its mean over the record, so that the linear
+# derivatives stay those of the flight condition. Drag and axial force have their own powers.
+COMPETING = {
+    "longitudinal": (("alpha", "alpha"), ("alpha", "alpha", "alpha"), ("alpha", "q_hat"), ("alpha", "elevator"),
+                     ("elevator", "elevator"), ("alpha", "alpha", "elevator")),
+    "lateral": (("beta", "beta", "beta"), ("beta", "beta"), ("alpha", "beta"), ("alpha", "p_hat"), ("alpha", "r_hat"),
+                ("alpha", "aileron"), ("alpha", "rudder"), ("beta", "p_hat"), ("beta", "r_hat")),
+}  # fmt: skip
 SUFFIX = {"p_hat": "p", "q_hat": "q", "r_hat": "r", "CL2": "K"}
 UNIT = {"alpha2": "1/rad2", "CL2": "1"}
 
 
 def name_of(target: str, regressor: str) -> str:
     """Name of the derivative of `target` by `regressor`."""
-    return f"{target}_{SUFFIX.get(regressor, regressor)}"
+    return f"{target}_{'*'.join(SUFFIX.get(factor, factor) for factor in regressor.split('*'))}"
+
+
+def unit_of_term(regressor: str) -> str:
+    """Unit of a derivative by `regressor`: per radian for each of its factors, which all are angles or hat rates."""
+    power = regressor.count("*") + 1
+    return UNIT.get(regressor, "1/rad" if power == 1 else f"1/rad{power}")
+
+
+def competing(equation: Equation, data: dict[str, FloatArray], good: NDArray[np.bool_]) -> dict[str, FloatArray]:
+    """Nonlinear terms that may enter an equation, by name ("alpha*elevator"), each (N,); none where nothing varies."""
+    if set(equation.regressors) & {"CL2", "alpha2"}:
+        return {}
+    terms = {"*".join(t): t for t in COMPETING[equation.axis] if all(n in data for n in t)}
+    centred = {n: data[n] - np.mean(data[n][good]) for factors in terms.values() for n in factors}
+    return {name: np.prod([centred[n] for n in factors], axis=0) for name, factors in terms.items()}
 
 
 def movement(time: FloatArray, surface: FloatArray, good: NDArray[np.bool_]) -> float:
@@ -65,9 +88,24 @@ def movement(time: FloatArray, surface: FloatArray, good: NDArray[np.bool_]) -> 
 
 
 def fit_equation(
-    equation: Equation, data: dict[str, FloatArray], good: NDArray[np.bool_], moved: dict[str, float], method: str
+    equation: Equation,
+    data: dict[str, FloatArray],
+    good: NDArray[np.bool_],
+    moved: dict[str, float],
+    method: str,
+    entered: tuple[str, ...] = (),
 ) -> dict[str, Estimate]:
-    """Fit one equation on the good rows and judge each of its derivatives."""
+    """Fit one equation on the good rows and judge each of its derivatives.
+
+    Args:
+        equation: what to fit.
+        data: the target, the regressors and the `entered` terms, each (N,).
+        good: rows to use (N,).
+        moved: rms of each surface, rad.
+        method: name that the estimates carry.
+        entered: nonlinear terms in the model beside the equation's own.
+    """
+    equation = replace(equation, regressors=(*equation.regressors, *entered))
     names = tuple(name for name in equation.regressors if name not in equation.optional)
     full = _fit(equation.target, equation.regressors, data, good)
     extra = {n: _judge(equation, n, equation.regressors, full, data, good, moved, method) for n in equation.optional}
@@ -105,7 +143,7 @@ def _judge(
         why = "the record does not tell it from the other terms of its equation"
     if not why and not error <= LARGEST_RATIO * abs(value):
         why = f"its standard error {error:.2g} exceeds a third of the estimate {value:.2g}"
-    return Estimate(value, error, UNIT.get(name, "1/rad"), method, fit.r2, not why, why)
+    return Estimate(value, error, unit_of_term(name), method, fit.r2, not why, why)
 
 
 def _why_axis(equation: Equation, moved: dict[str, float]) -> str:
