@@ -16,7 +16,7 @@ from estimators import hinf
 from estimators.airframe import airframe_from
 from estimators.hinf import memory as hinf_memory
 from estimators.hinf import tuning as hinf_tuning
-from estimators.hinf.rows import PARAMETER_NAMES
+from estimators.observer.layout import PARAMETER_NAMES
 from icing_env.jit import bound
 from icing_env.types import ESTIMATE, ESTIMATED_NAMES, TARGET
 
@@ -104,6 +104,6 @@ def clean_estimate(airframe: NDArray, tuning: NDArray) -> NDArray:
     for i, name in enumerate(PARAMETER_NAMES):
         if name in ESTIMATED_NAMES:
             estimate[name] = memory["theta"][0, i]
-            estimate[f"{name}_std"] = np.sqrt(memory["b3"][0, hinf_memory.DIAGONAL[i]])
+            estimate[f"{name}_std"] = memory["deviation"][0, i]
     estimate["health"] = 1.0
     return estimate

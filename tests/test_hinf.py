@@ -11,9 +11,8 @@ from small_aircraft import fly, noisy
 from estimators import hinf
 from estimators.airframe import airframe_from, published_airframe
 from estimators.hinf.channel import learn
-from estimators.hinf.memory import DIAGONAL, FIRST, PACKED, clean_values
-from estimators.hinf.rows import PARAMETER_NAMES
 from estimators.hinf.tuning import default_tuning, tuning_from
+from estimators.observer.layout import DIAGONAL, FIRST, PACKED, PARAMETER_NAMES, clean_values
 from icing_env.configuration import folder
 from icing_env.errors import InputError
 from icing_env.types import ESTIMATE, ESTIMATED_NAMES

@@ -9,9 +9,8 @@ from small_aircraft import controls
 from controllers import autopilot
 from estimators import hinf
 from estimators.airframe import airframe_from
-from estimators.hinf.memory import clean_values
-from estimators.hinf.rows import PARAMETER_NAMES
 from estimators.hinf.tuning import default_tuning
+from estimators.observer.layout import PARAMETER_NAMES, clean_values
 from icing_env import aircraft
 from icing_env.simulate import Fleet
 from icing_env.trim import trim

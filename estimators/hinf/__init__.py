@@ -2,5 +2,6 @@
 
 from estimators.hinf.filter import step
 from estimators.hinf.memory import OBSERVER, init
+from estimators.hinf.tuning import default_tuning
 
-__all__ = ["OBSERVER", "init", "step"]
+__all__ = ["OBSERVER", "default_tuning", "init", "step"]

@@ -25,7 +25,8 @@ The accelerometer's row is put behind the same filter, both sides of it, before 
 which keeps its information where the aircraft moves and leaves the vanes' noise out of the regressors (unfiltered,
 0.1 deg of noise in alpha lowers CL_alpha by 4 %). So one f serves both rows of a channel.
 
-The filters advance by RK4 with inputs interpolated to the half step (`filter_step`). The equations of Pi and
+The filters advance by RK4 with inputs interpolated to the half step (estimators.observer.filters). The equations of
+Pi and
 thetahat are stiff (rates of 1e5/s in a rudder doublet, where RK4 needs less than 2.8/h), but with f held over the
 sample they have a solution in closed form, which `learn` applies: positive definite for every step size exactly
 when gamma >= 1, with a finite escape when gamma < 1 that is caught as such. Each row of data enters by itself,
@@ -41,17 +42,6 @@ import math
 from typing import Any
 
 from icing_env.jit import block, kernel
-
-
-@kernel
-def filter_step(x: float, u0: float, u1: float, rate: float, dt: float) -> float:
-    """xdot = u(t) - rate x over one sample by RK4, u linear between u0 and u1."""
-    half = 0.5 * (u0 + u1)
-    k1 = u0 - rate * x
-    k2 = half - rate * (x + 0.5 * dt * k1)
-    k3 = half - rate * (x + 0.5 * dt * k2)
-    k4 = u1 - rate * (x + dt * k3)
-    return x + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
 
 
 @kernel

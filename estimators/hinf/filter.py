@@ -1,14 +1,15 @@
 """The recursive H-infinity identifier: six decoupled channels, one row of memory per aircraft, compiled.
 
 Each call of `step` takes one sample of measurements per aircraft and returns estimates of the aerodynamic
-coefficients with their uncertainty. `hinf_channel` has the mathematics, `hinf_rows` the flight mechanics,
+coefficients with their uncertainty. `channel` has the mathematics, `estimators.observer` the flight mechanics,
 `configs/estimators/hinf.toml` the tuning. The identifier sees measurements and the clean airframe, never truth.
 
 A standard error is the square root of the diagonal of B3: one standard deviation of the estimate if the
 unmodelled accelerations and the measurement errors are white with the densities d^2, n^2 and n_a^2 of the tuning.
 A finite gamma inflates it, by at most (1 - gamma^-2)^(-1/2).
 
-Channels learn, and their parameters are allowed to wander, only while they are excited (`hinf_excitation`): gusts and
+Channels learn, and their parameters are allowed to wander, only while they are excited
+(`estimators.observer.excitation`): gusts and
 an autopilot's answer to them would drag Cm_alpha and Cm_q towards a false ice alarm, noise would lower CL_alpha in
 calm air. Drag is always live.
 """
@@ -18,43 +19,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from estimators.hinf.channel import filter_step, forget, learn
-from estimators.hinf.excitation import excite, gate, shares
-from estimators.hinf.memory import ACCELEROMETER, COUNT, DIAGONAL, FIRST, PACKED
-from estimators.hinf.rows import clean_zero_lift_drag, force_rows, moment_rows, readable
+from estimators.hinf.channel import forget, learn
+from estimators.observer.excitation import gate
+from estimators.observer.filters import look, remember
+from estimators.observer.layout import ACCELEROMETER, COUNT, DIAGONAL, FIRST, PACKED
+from estimators.observer.report import follow_drag, report
+from estimators.observer.rows import readable
 from icing_env.jit import entry, kernel
-
-
-@kernel
-def advance_filters(ob: Any, tn: Any, dt: float) -> None:
-    """f and zeta of every channel, and what the accelerometers feel, over one sample (RK4)."""
-    for channel in range(6):
-        rate = tn["d"][channel] / tn["n"][channel]
-        for i in range(FIRST[channel], FIRST[channel] + COUNT[channel]):
-            ob["filtered"][i] = filter_step(ob["filtered"][i], ob["row_before"][i], ob["row"][i], rate, dt)
-        before = ob["rest_before"][channel] + rate * ob["y_before"][channel]
-        now = ob["rest"][channel] + rate * ob["y"][channel]
-        ob["zeta"][channel] = filter_step(ob["zeta"][channel], before, now, rate, dt)
-        a = ACCELEROMETER[channel]
-        if a >= 0:
-            ob["felt_filtered"][a] = filter_step(ob["felt_filtered"][a], ob["felt_before"][a], ob["felt"][a], rate, dt)
-
-
-@kernel
-def remember(ob: Any, seat: bool) -> None:
-    """Keep this sample's rows; with `seat`, start the filters here: xhat = y, nothing filtered yet."""
-    for i in range(26):
-        ob["row_before"][i] = ob["row"][i]
-        if seat:
-            ob["filtered"][i] = 0.0
-    for i in range(6):
-        ob["rest_before"][i], ob["y_before"][i] = ob["rest"][i], ob["y"][i]
-        if seat:
-            ob["zeta"][i] = ob["y"][i]
-    for i in range(3):
-        ob["felt_before"][i] = ob["felt"][i]
-        if seat:
-            ob["felt_filtered"][i] = 0.0
 
 
 @kernel
@@ -77,7 +48,7 @@ def learn_all(ob: Any, tn: Any, excited: tuple[float, float, float, float], dt: 
         good &= learn(theta, b3, gain, first, packed, m, ob["filtered"], 1.0, target, information, kappa)
         if ACCELEROMETER[c] >= 0:
             a = ACCELEROMETER[c]
-            factor = ob["factor"][a] * tn["d"][c] / tn["n"][c]
+            factor = ob["factor"][a] * ob["bandwidth"][c]
             target = ob["felt_filtered"][a] * factor
             information = heard[c] / (tn["accelerometer"][a] * tn["accelerometer"][a])
             good &= learn(theta, b3, gain, first, packed, m, ob["filtered"], factor, target, information, kappa)
@@ -100,37 +71,6 @@ def healthy(ob: Any) -> bool:
 
 
 @kernel
-def report(ob: Any, est: Any, longitudinal: float, lateral: float) -> None:
-    """Write estimates, standard errors, excess drag and excitation; health is 1. Order: PARAMETER_NAMES."""
-    th, sd = ob["theta"], ob["deviation"]
-    for i in range(26):
-        sd[i] = math.sqrt(ob["b3"][DIAGONAL[i]])
-    est["CD_0"], est["CL_0"], est["CL_alpha"] = th[0], th[1], th[2]
-    est["CL_elevator"], est["Cm_0"], est["Cm_alpha"] = th[4], th[5], th[6]
-    est["Cm_q"], est["Cm_elevator"], est["CY_0"] = th[7], th[8], th[9]
-    est["CY_beta"], est["CY_r"], est["CY_rudder"] = th[10], th[12], th[13]
-    est["Cl_0"], est["Cl_beta"], est["Cl_p"] = th[14], th[15], th[16]
-    est["Cl_r"], est["Cl_aileron"], est["Cl_rudder"] = th[17], th[18], th[19]
-    est["Cn_0"], est["Cn_beta"], est["Cn_p"] = th[20], th[21], th[22]
-    est["Cn_r"], est["Cn_aileron"], est["Cn_rudder"] = th[23], th[24], th[25]
-    est["CD_0_std"], est["CL_0_std"] = sd[0], sd[1]
-    est["CL_alpha_std"], est["CL_elevator_std"] = sd[2], sd[4]
-    est["Cm_0_std"], est["Cm_alpha_std"] = sd[5], sd[6]
-    est["Cm_q_std"], est["Cm_elevator_std"] = sd[7], sd[8]
-    est["CY_0_std"], est["CY_beta_std"] = sd[9], sd[10]
-    est["CY_r_std"], est["CY_rudder_std"] = sd[12], sd[13]
-    est["Cl_0_std"], est["Cl_beta_std"] = sd[14], sd[15]
-    est["Cl_p_std"], est["Cl_r_std"] = sd[16], sd[17]
-    est["Cl_aileron_std"], est["Cl_rudder_std"] = sd[18], sd[19]
-    est["Cn_0_std"], est["Cn_beta_std"] = sd[20], sd[21]
-    est["Cn_p_std"], est["Cn_r_std"] = sd[22], sd[23]
-    est["Cn_aileron_std"], est["Cn_rudder_std"] = sd[24], sd[25]
-    est["excess_drag"] = ob["excess_drag"]
-    est["excitation_longitudinal"], est["excitation_lateral"] = longitudinal, lateral
-    est["health"] = 1.0
-
-
-@kernel
 def observe(ob: Any, est: Any, m: Any, af: Any, tn: Any, dt: float) -> None:
     """One aircraft, one sample. See `step`."""
     est["health"] = 0.0
@@ -139,20 +79,16 @@ def observe(ob: Any, est: Any, m: Any, af: Any, tn: Any, dt: float) -> None:
     if not readable(m):
         ob["seated"] = 0.0
         return
-    moment_rows(ob, m, af, force_rows(ob, m, af, dt))
-    if ob["seated"] > 0.0:
-        advance_filters(ob, tn, dt)
-    excite(ob, af, tn["window"], dt)
-    excited = shares(ob, tn, af)
+    excited = look(ob, m, af, tn, dt)
     if ob["seated"] > 0.0:
         good = learn_all(ob, tn, excited, dt)
         if not (good and healthy(ob)):
             ob["failed"] = 1.0
             return
-        excess = ob["theta"][0] - clean_zero_lift_drag(af)
-        ob["excess_drag"] += min(1.0, dt / tn["drag_smoothing"]) * (excess - ob["excess_drag"])
-    remember(ob, ob["seated"] == 0.0)
-    ob["seated"] = 1.0
+        follow_drag(ob, af, tn, dt)
+        for i in range(26):
+            ob["deviation"][i] = math.sqrt(ob["b3"][DIAGONAL[i]])
+    remember(ob)
     report(ob, est, excited[0], excited[1])
 
 

@@ -1,4 +1,4 @@
-"""A flight record as the measurements and the airframe that the H-infinity identifier takes."""
+"""A flight record as the measurements and the airframe that the recursive identifiers take."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.airframe import airframe_from, published_airframe
-from estimators.hinf.rows import GAS_CONSTANT
+from estimators.observer.rows import GAS_CONSTANT
 from estimators.regression.equations import NEEDED
 from estimators.signals.coefficients import dynamic_pressure
 from estimators.signals.resample import Grid

@@ -1,4 +1,4 @@
-"""The rows of the H-infinity identifier: what each channel's derivative is, linear in that channel's coefficients.
+"""The rows of every recursive identifier: what each channel's derivative is, linear in that channel's coefficients.
 
 Standard rigid-body equations (Klein and Morelli, Aircraft System Identification, chapter 3), Ixz = + int x z dm.
 Everything that is not an estimated coefficient is formed from measured quantities and goes into b.
@@ -16,16 +16,6 @@ from icing_env.jit import kernel
 
 GRAVITY = 9.80665  # m/s2, standard
 GAS_CONSTANT = 287.05287  # J/(kg K), 1976 standard atmosphere
-
-# Order of the parameters in the observer's memory, channel by channel. Those of ESTIMATED_NAMES and two more.
-PARAMETER_NAMES = (
-    "CD_0",
-    "CL_0", "CL_alpha", "CL_q", "CL_elevator",
-    "Cm_0", "Cm_alpha", "Cm_q", "Cm_elevator",
-    "CY_0", "CY_beta", "CY_p", "CY_r", "CY_rudder",
-    "Cl_0", "Cl_beta", "Cl_p", "Cl_r", "Cl_aileron", "Cl_rudder",
-    "Cn_0", "Cn_beta", "Cn_p", "Cn_r", "Cn_aileron", "Cn_rudder",
-)  # fmt: skip
 
 
 @kernel
@@ -65,8 +55,10 @@ def flap_forces(flap: float, alpha: float, af: Any) -> tuple[float, float]:
 
 
 @kernel
-def force_rows(ob: Any, m: Any, af: Any, dt: float) -> float:
-    """Drag, lift and side force: states airspeed, alpha, beta; accelerometers x, z, y.
+def force_rows(ob: Any, m: Any, af: Any, v: float, alpha: float, beta: float, p: float, q: float, r: float) -> float:
+    """Drag, lift and side force: states airspeed, alpha, beta; accelerometers x, z, y. Returns qbar (Pa).
+
+    The states are given (measured, or estimated); attitude, controls, thrust and accelerations are those of `m`.
 
     Drag:  a_x = k (CX_clean(alpha) - (CD_0 - CD_0,clean) cos alpha) + T/m, k = qbar S/m. Lift-dependent drag keeps the
     clean shape along body x, so that CD_0 is the drag at zero lift with thrust removed.
@@ -76,8 +68,6 @@ def force_rows(ob: Any, m: Any, af: Any, dt: float) -> float:
     Side:  a_y = k (CY_0 + CY_beta beta + CY_p p^ + CY_r r^ + CY_rudder rudder).
     """
     row, rest = ob["row"], ob["rest"]
-    v, p, q, r = m["airspeed"], m["p"], m["q"], m["r"]
-    alpha, beta = incidence(m, af["vane_lag"], af["boom_gain"], dt)
     ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
     st, ct, sp, cp = math.sin(m["theta"]), math.cos(m["theta"]), math.sin(m["phi"]), math.cos(m["phi"])
     qbar = 0.5 * m["pressure"] / (GAS_CONSTANT * m["temperature"]) * v * v
@@ -115,8 +105,10 @@ def force_rows(ob: Any, m: Any, af: Any, dt: float) -> float:
 
 
 @kernel
-def moment_rows(ob: Any, m: Any, af: Any, qbar: float) -> None:
-    """Pitch, roll and yaw, after `force_rows`.
+def moment_rows(
+    ob: Any, m: Any, af: Any, qbar: float, v: float, alpha: float, beta: float, p: float, q: float, r: float
+) -> None:
+    """Pitch, roll and yaw, at the same states as `force_rows`.
 
     The states p - (Ixz/Ixx) r and r - (Ixz/Izz) p leave one moment in each equation:
     Iyy qdot = qbar S c Cm + (Izz - Ixx) p r + Ixz (r^2 - p^2);
@@ -125,8 +117,6 @@ def moment_rows(ob: Any, m: Any, af: Any, qbar: float) -> None:
     A moment of thrust about the c.g. is not known to the observer and counts as Cm_0 or Cn_0.
     """
     row, rest = ob["row"], ob["rest"]
-    v, p, q, r = m["airspeed"], m["p"], m["q"], m["r"]
-    alpha, beta = ob["y"][1], ob["y"][3]
     xx, yy, zz, xz = af["inertia_xx"], af["inertia_yy"], af["inertia_zz"], af["inertia_xz"]
     half_span, force = 0.5 * af["span"] / v, qbar * af["wing_area"]
 

@@ -1,0 +1,1 @@
+"""What every recursive identifier shares: flight equations, matched filters, excitation, its run over a record."""
