@@ -16,6 +16,7 @@ from icing_env.errors import InputError, nearest
 Identify = Callable[..., dict[str, Estimate]]
 METHODS: dict[str, str] = {  # name: module
     "stepwise": "estimators.regression.equation_error",
+    "orthogonal": "estimators.regression.orthogonal",
     "hinf": "estimators.hinf.record",
 }
 

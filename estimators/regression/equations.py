@@ -6,7 +6,8 @@ parabolic polar CD = CD_0 + CD_K CL^2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,7 +92,7 @@ def fit_equation(
     equation: Equation,
     data: dict[str, FloatArray],
     good: NDArray[np.bool_],
-    moved: dict[str, float],
+    moved: Mapping[str, float],
     method: str,
     entered: tuple[str, ...] = (),
 ) -> dict[str, Estimate]:
@@ -105,17 +106,50 @@ def fit_equation(
         method: name that the estimates carry.
         entered: nonlinear terms in the model beside the equation's own.
     """
-    equation = replace(equation, regressors=(*equation.regressors, *entered))
-    names = tuple(name for name in equation.regressors if name not in equation.optional)
-    full = _fit(equation.target, equation.regressors, data, good)
-    extra = {n: _judge(equation, n, equation.regressors, full, data, good, moved, method) for n in equation.optional}
-    seen = tuple(name for name in equation.optional if extra[name].identifiable)
-    kept = tuple(name for name in equation.regressors if name in names or name in seen)
-    fit = full if kept == equation.regressors else _fit(equation.target, kept, data, good)
-    result = {name_of(equation.target, n): _judge(equation, n, kept, fit, data, good, moved, method) for n in kept}
-    result.update({name_of(equation.target, n): extra[n] for n in equation.optional if n not in kept})
-    why = _why_axis(equation, moved)
-    bias = Estimate(float(fit.theta[-1]), float(fit.std_error[-1]), "1", method, fit.r2, not why, why)
+    regressors = (*equation.regressors, *entered)
+    full = _fit(equation.target, regressors, data, good)
+    known = {name: data[name][good] for name in regressors}
+    judged = judge_terms(equation, regressors, full, known, moved, method)
+    unseen = [n for n in equation.optional if not judged[name_of(equation.target, n)].identifiable]
+    if not unseen:
+        return judged
+    kept = tuple(name for name in regressors if name not in unseen)
+    fit = _fit(equation.target, kept, data, good)
+    result = judge_terms(equation, kept, fit, {name: known[name] for name in kept}, moved, method)
+    return {**result, **{name: judged[name] for name in (name_of(equation.target, n) for n in unseen)}}
+
+
+def judge_terms(
+    equation: Equation,
+    names: tuple[str, ...],
+    fit: Fit,
+    regressors: Mapping[str, FloatArray],
+    moved: Mapping[str, float],
+    method: str,
+) -> dict[str, Estimate]:
+    """Derivatives of a fitted equation by name, the bias among them, and whether the record shows each.
+
+    Args:
+        equation: what was fitted.
+        names: its terms in the order of the fit, whose last one is the bias.
+        fit: estimates and errors.
+        regressors: the terms on the rows that were used.
+        moved: rms of each surface, rad.
+        method: name that the estimates carry.
+    """
+    table = np.abs(correlation(np.column_stack([regressors[name] for name in names]))) if names else np.zeros((0, 0))
+    axis, result = _why_axis(equation, moved), dict[str, Estimate]()
+    for i, name in enumerate(names):
+        value, error = float(fit.theta[i]), float(fit.std_error[i])
+        why = axis or _why_surface(name, moved) or _why_together(name, names, table)
+        if not why and not fit.full_rank:
+            why = "the record does not tell it from the other terms of its equation"
+        if not why and not error <= LARGEST_RATIO * abs(value):
+            why = f"its standard error {error:.2g} exceeds a third of the estimate {value:.2g}"
+        result[name_of(equation.target, name)] = Estimate(
+            value, error, unit_of_term(name), method, fit.r2, not why, why
+        )
+    bias = Estimate(float(fit.theta[-1]), float(fit.std_error[-1]), "1", method, fit.r2, not axis, axis)
     return {**result, f"{equation.target}_0": bias}
 
 
@@ -125,28 +159,7 @@ def _fit(target: str, names: tuple[str, ...], data: dict[str, FloatArray], good:
     return least_squares(matrix, np.where(good, data[target], 0.0))
 
 
-def _judge(
-    equation: Equation,
-    name: str,
-    names: tuple[str, ...],
-    fit: Fit,
-    data: dict[str, FloatArray],
-    good: NDArray[np.bool_],
-    moved: dict[str, float],
-    method: str,
-) -> Estimate:
-    """One derivative with its standard error, and whether the record shows it."""
-    i = names.index(name)
-    value, error = float(fit.theta[i]), float(fit.std_error[i])
-    why = _why_axis(equation, moved) or _why_surface(name, moved) or _why_together(name, names, data, good)
-    if not why and not fit.full_rank:
-        why = "the record does not tell it from the other terms of its equation"
-    if not why and not error <= LARGEST_RATIO * abs(value):
-        why = f"its standard error {error:.2g} exceeds a third of the estimate {value:.2g}"
-    return Estimate(value, error, unit_of_term(name), method, fit.r2, not why, why)
-
-
-def _why_axis(equation: Equation, moved: dict[str, float]) -> str:
+def _why_axis(equation: Equation, moved: Mapping[str, float]) -> str:
     surfaces = SURFACES[equation.axis]
     if max(moved.get(s, 0.0) for s in surfaces) >= EXCITED:
         return ""
@@ -154,17 +167,17 @@ def _why_axis(equation: Equation, moved: dict[str, float]) -> str:
     return f"no {equation.axis} manoeuvre: {told}, at least {np.degrees(EXCITED):.2f} is needed"
 
 
-def _why_surface(name: str, moved: dict[str, float]) -> str:
+def _why_surface(name: str, moved: Mapping[str, float]) -> str:
     if name not in moved or moved[name] >= EXCITED:
         return ""
     return f"{name} moved {np.degrees(moved[name]):.2f} deg rms, at least {np.degrees(EXCITED):.2f} is needed"
 
 
-def _why_together(name: str, names: tuple[str, ...], data: dict[str, FloatArray], good: NDArray[np.bool_]) -> str:
+def _why_together(name: str, names: tuple[str, ...], table: FloatArray) -> str:
+    """Reason from the correlations (p, p) of the terms."""
     if len(names) < 2 or "alpha2" in names:  # a power moves with its base by definition; its standard error says it
         return ""
-    matrix = correlation(np.column_stack([data[n][good] for n in names]))
-    row = np.abs(matrix[names.index(name)])
+    row = table[names.index(name)].copy()
     row[names.index(name)] = 0.0
     other = int(np.argmax(row))
     if row[other] <= LARGEST_CORRELATION:
