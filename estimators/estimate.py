@@ -9,7 +9,8 @@ from dataclasses import dataclass
 class Estimate:
     """A parameter, its standard error and whether the record could show it.
 
-    `r2` is that of the equation it was fitted in. `why` is a plain sentence where `identifiable` is false.
+    `r2` is that of the equation it was fitted in. `why` is a plain sentence where `identifiable` is false;
+    `warning` one where the record breaks an assumption of the method, so that the standard error may be too small.
     """
 
     estimate: float
@@ -19,3 +20,4 @@ class Estimate:
     r2: float | None = None
     identifiable: bool = True
     why: str = ""
+    warning: str = ""
