@@ -1,0 +1,224 @@
+"""Data compatibility of a whole record: biases and scale factors of its instruments, and the record without them.
+
+`wind=False` is the usual analysis: output error on the kinematics, in still air. What turbulence adds to the vanes then
+lands in the scale factors and biases (the founding paper's figure 20), and its standard errors do not hold; the record
+says so. `wind=True` carries Dryden gusts as states (estimators.compatibility.gusts).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimators.compatibility.flow_angles import at_centre_of_gravity
+from estimators.compatibility.gusts import LENGTH, Whitening, measure
+from estimators.compatibility.kinematics import INPUTS, OUTPUTS, SCALED
+from estimators.compatibility.selection import ORDER, Filter, Found, Model, Readings, select
+from estimators.estimate import Estimate
+from estimators.regression.equations import movement
+from estimators.signals.data_checks import check
+from estimators.signals.fourier_smoothing import fourier_smooth
+from estimators.signals.resample import Grid, common_grid
+from icing_env.errors import InputError
+from icing_env.record import DataProblem, FlightRecord, FloatArray
+
+NEEDED = ("airspeed", "alpha", "q", "theta", "ax", "az")
+LATERAL = ("beta", "p", "r", "phi", "ay")
+UNITS = {"airspeed": "m/s", "ax": "m/s2", "ay": "m/s2", "az": "m/s2", "p": "rad/s", "q": "rad/s", "r": "rad/s"}
+MOVED = np.radians(0.25)  # rms of a flow angle about its trend below which its scale is not asked for (assumed)
+SMOOTH = 0.3  # m/s: sigma of the gusts up to which flight tests call the air smooth (facts of MIL-F-8785C practice)
+PASSES = 2  # of measuring the gusts and fitting again
+
+
+@dataclass(frozen=True)
+class Compatibility:
+    """Errors of the instruments that make the record one motion.
+
+    Attributes:
+        parameters: bias_NAME (the channel's unit) and scale_NAME (1), with `reading = (1 + scale) truth + bias`;
+            `identifiable` is false for what was left out, which counts as zero.
+        record: corrected for what was found, flow angles and accelerations at the centre of gravity.
+        time: s (N,).
+        residual: readings less the motion's, by channel (N,).
+        gust: smoothed gusts by channel, as velocity of the air "u", "v", "w" (N,) m/s, where `wind` was asked for.
+        sigma: standard deviation of the gust in each of them, m/s, measured in either case.
+        converged: whether the fit did.
+        notes: what was assumed and what to beware of.
+    """
+
+    parameters: dict[str, Estimate]
+    record: FlightRecord
+    time: FloatArray
+    residual: dict[str, FloatArray]
+    gust: dict[str, FloatArray]
+    sigma: dict[str, float]
+    converged: bool
+    notes: tuple[str, ...]
+
+    @property
+    def found(self) -> dict[str, Estimate]:
+        """Those errors that the record shows."""
+        return {name: e for name, e in self.parameters.items() if e.identifiable}
+
+
+def check_compatibility(record: FlightRecord, wind: bool = False) -> Compatibility:
+    """Find the errors of the instruments in `record`, without or with gusts as states.
+
+    Raises:
+        InputError: the record is refused by `data_checks.check`, lacks time, airspeed, alpha, q, theta, ax or az, or
+            its motion cannot be followed.
+    """
+    record = check(record)
+    grid = common_grid(record)
+    lacking = [name for name in NEEDED if name not in grid.values]
+    if lacking:
+        raise InputError(f"record '{record.meta.name}' lacks {', '.join(lacking)}: compatibility needs "
+                         f"{', '.join(NEEDED)}")  # fmt: skip
+    values, notes = at_centre_of_gravity(grid.values, record.meta.sensors, grid.dt)
+    readings, channels = _readings(grid, values, record)
+    candidates, ruled = _candidates(grid, values, channels)
+    model = Model(readings, lambda y: y)
+    found = select(model, candidates, ruled)
+    gusts = _gusts(readings, model.residual(found.row))
+    if wind:
+        for _ in range(PASSES):
+            model = Model(replace(readings, measured=_whole(readings, grid, values)), _filter(gusts))
+            found = select(model, candidates, ruled, found.row)
+            gusts = _gusts(readings, model.residual(found.row))
+    return _answer(record, grid, values, readings, found, gusts, wind, notes)
+
+
+def corrected(record: FlightRecord, wind: bool = False) -> FlightRecord:
+    """The record without the errors that `check_compatibility` finds in it; errors as there."""
+    return check_compatibility(record, wind).record
+
+
+def _readings(grid: Grid, values: Mapping[str, FloatArray], record: FlightRecord) -> tuple[Readings, tuple[str, ...]]:
+    """Inputs and outputs; lateral channels are used together or not at all, and are zero where not used."""
+    lateral = all(name in values for name in LATERAL)
+    names = [n for n in OUTPUTS if n in values and (lateral or n in NEEDED)]
+    zero = np.zeros(len(grid.time))
+    inputs = np.column_stack([values[n] if n in values and (lateral or n in NEEDED) else zero for n in INPUTS])
+    known = {n: values[n] if n != "psi" else np.unwrap(values[n]) for n in names}
+    blank = {n: ~grid.good((n,)) for n in names}
+    if grid.time is record.time:
+        blank |= {n: ~np.isfinite(record[n]) for n in names}
+    measured = np.column_stack([np.where(blank[n], np.nan, known[n]) for n in names])
+    reach = min(len(grid.time), max(3, round(0.2 / grid.dt)))
+    start = np.array([float(np.median(known[n][:reach])) for n in names])
+    noise = np.array([fourier_smooth(x, grid.dt).noise for x in inputs.T])
+    return Readings(inputs, measured, tuple(OUTPUTS.index(n) for n in names), grid.dt, start, noise), tuple(names)
+
+
+def _whole(readings: Readings, grid: Grid, values: Mapping[str, FloatArray]) -> FloatArray:
+    """Outputs without blanks, which a recursive filter cannot pass: interpolated."""
+    columns = [values[OUTPUTS[i]] if OUTPUTS[i] != "psi" else np.unwrap(values["psi"]) for i in readings.channels]
+    return np.column_stack(columns)
+
+
+def _candidates(
+    grid: Grid, values: Mapping[str, FloatArray], channels: tuple[str, ...]
+) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Errors that may be asked for, and why not some others: scales of angles that did not move."""
+    inputs = [n for n in INPUTS if n in values and (n in NEEDED or "beta" in channels)]
+    wanted = {f"bias_{n}" for n in (*inputs, *channels)} | {f"scale_{n}" for n in SCALED if n in channels}
+    ruled = {}
+    for name in ("alpha", "beta"):
+        if name not in channels:
+            continue
+        moved = movement(grid.time, values[name], grid.good((name,)))
+        if moved < MOVED:
+            ruled[f"scale_{name}"] = (
+                f"{name} moved {np.degrees(moved):.2f} deg rms, at least {np.degrees(MOVED):.2f} is needed"
+            )
+    return tuple(name for name in ORDER if name in wanted and name not in ruled), ruled
+
+
+def _gusts(readings: Readings, residual: FloatArray) -> dict[int, tuple[Whitening, float]]:
+    """Whitening filter and noise for each flow channel, by its place among the columns."""
+    found = {}
+    for column, channel in enumerate(readings.channels):
+        if OUTPUTS[channel] in SCALED:
+            step = readings.start[0] * readings.dt / LENGTH
+            known = np.isfinite(residual[:, column])
+            centred = residual[known, column]
+            found[column] = measure(centred, OUTPUTS[channel] != "airspeed", step)
+    return found
+
+
+def _filter(gusts: dict[int, tuple[Whitening, float]]) -> Filter:
+    """The whitening of every flow channel."""
+
+    def through(outputs: FloatArray) -> FloatArray:
+        out = outputs.copy()
+        for column, (filtered, _) in gusts.items():
+            out[:, :, column] = filtered(outputs[:, :, column], axis=1)
+        return out
+
+    return through
+
+
+def _answer(
+    record: FlightRecord,
+    grid: Grid,
+    values: Mapping[str, FloatArray],
+    readings: Readings,
+    found: Found,
+    gusts: dict[int, tuple[Whitening, float]],
+    wind: bool,
+    notes: tuple[str, ...],
+) -> Compatibility:
+    """Everything that is told."""
+    residual = Model(readings, lambda y: y).residual(found.row)
+    air, sigma = {}, {}
+    for column, (filtered, noise) in gusts.items():
+        name = OUTPUTS[readings.channels[column]]
+        per = -1.0 if name == "airspeed" else -float(np.mean(values["airspeed"]))
+        axis = {"airspeed": "u", "alpha": "w", "beta": "v"}[name]
+        sigma[axis] = abs(per) * noise * filtered.ratio
+        if wind:
+            air[axis] = per * filtered.gust(np.nan_to_num(residual[:, column]))
+    parameters = {name: _estimate(name, found, wind) for name in ORDER if name in found.names or name in found.dropped}
+    if not wind and max(sigma.get(axis, 0.0) for axis in ("v", "w")) > SMOOTH:
+        notes += (f"turbulence of sigma {max(sigma.values()):.1f} m/s lands in scale factors and biases: standard "
+                  "errors do not hold; with wind states they do",)  # fmt: skip
+    names = [OUTPUTS[i] for i in readings.channels]
+    return Compatibility(
+        parameters, _corrected(record, grid, values, parameters), grid.time,
+        {name: residual[:, j] for j, name in enumerate(names)}, air, sigma, found.result.converged, notes,
+    )  # fmt: skip
+
+
+def _estimate(name: str, found: Found, wind: bool) -> Estimate:
+    method = "compatibility with wind states" if wind else "compatibility"
+    unit = "1" if name.startswith("scale_") else UNITS.get(name.removeprefix("bias_"), "rad")
+    if name in found.names:
+        value, error = found.value(name)
+        return Estimate(value, error, unit, method)
+    return Estimate(0.0, float("nan"), unit, method, None, False, found.dropped[name])
+
+
+def _corrected(
+    record: FlightRecord, grid: Grid, values: Mapping[str, FloatArray], parameters: dict[str, Estimate]
+) -> FlightRecord:
+    """The record on its grid without the errors found; what its owner computed belongs to it as it was."""
+    channels, problems = {"time": grid.time}, []
+    for name in record.channels:
+        if name not in values:
+            continue
+        bias, scale = (parameters.get(f"{kind}_{name}") for kind in ("bias", "scale"))
+        offset, factor = bias.estimate if bias else 0.0, 1.0 + (scale.estimate if scale else 0.0)
+        fixed = (values[name] - offset) / factor
+        channels[name] = np.where(grid.missing[name], np.nan, fixed) if name in grid.missing else fixed
+        if offset or factor != 1.0:
+            told = ", ".join(
+                text
+                for text, there in ((f"bias {offset:.3g}", offset), (f"scale {factor - 1:+.3f}", factor != 1.0))
+                if there
+            )
+            problems.append(DataProblem(name, f"{told} taken out", float(grid.time[0]), float(grid.time[-1]), True))
+    owner = {name: grid.values[name] for name in record.owner if name in grid.values}
+    fixed_record = replace(record, channels=channels, owner=owner, meta=replace(record.meta, corrected=True))
+    return fixed_record.with_problems(problems)
