@@ -18,6 +18,10 @@ METHODS: dict[str, str] = {  # name: module
     "stepwise": "estimators.regression.equation_error",
     "orthogonal": "estimators.regression.orthogonal",
     "hinf": "estimators.hinf.record",
+    "rls": "estimators.recursive.rls",
+    "real_time_frequency": "estimators.recursive.real_time_frequency",
+    "ekf": "estimators.recursive.ekf",
+    "ukf": "estimators.recursive.ukf",
 }
 
 

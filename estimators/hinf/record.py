@@ -11,11 +11,11 @@ from estimators import hinf
 from estimators.estimate import Estimate
 from estimators.hinf.tuning import default_tuning
 from estimators.observer import record as runs
-from estimators.observer.layout import SEEN
+from estimators.observer.layout import SEEN_NAMES
 from estimators.observer.record import STARTS, History, Method
 from icing_env.record import FlightRecord
 
-METHOD = Method("H-infinity", hinf.init, hinf.step, default_tuning, (*(field[0] for field in SEEN), "b3"))
+METHOD = Method("H-infinity", hinf.init, hinf.step, default_tuning, (*SEEN_NAMES, "b3"))
 
 
 def history(

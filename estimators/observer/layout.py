@@ -42,6 +42,7 @@ SEEN = [
     ("seated", "f8"),  # 0: the next readable sample starts the filters
     ("failed", "f8"),  # 1: a matrix lost its positive definiteness; estimates are held from then on
 ]  # fmt: skip
+SEEN_NAMES = tuple(str(field[0]) for field in SEEN)
 
 
 def clean_values(airframe: np.ndarray) -> np.ndarray:
@@ -66,13 +67,13 @@ def seat(
 ) -> np.ndarray:
     """Fill the shared fields of `memory` (n,): estimates at `start` times the clean aircraft, and their spread.
 
-    tuning: one row with `smallest_scale` (26,) and `q0` (6,). bandwidth: (6,) rad/s. The prior's standard deviation is
-    scale/sqrt(q0). Returns it, shape (n, 26).
+    tuning: one row with `smallest_scale` (26,) and `q0` (one, or six). bandwidth: (6,) rad/s. The prior's standard
+    deviation is scale/sqrt(q0). Returns it, shape (n, 26).
     """
     clean = clean_values(airframe)
     memory["theta"] = start * clean
     memory["scale"] = np.maximum(np.abs(clean), tuning["smallest_scale"][0])
     memory["bandwidth"] = bandwidth
-    weight = np.repeat(tuning["q0"][0], COUNT)
+    weight = np.repeat(np.broadcast_to(tuning["q0"][0], 6), COUNT)
     memory["deviation"] = memory["scale"] / np.sqrt(weight)
     return np.asarray(memory["deviation"].copy())

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.estimate import Estimate
-from estimators.observer.layout import ACCELEROMETER, CHANNELS, COUNT, FIRST, PARAMETER_NAMES, SEEN
+from estimators.observer.layout import ACCELEROMETER, CHANNELS, COUNT, FIRST, PARAMETER_NAMES, SEEN_NAMES
 from estimators.observer.measurements import absent, airframe_of_record, measurements
 from estimators.regression.equations import EXCITED, LARGEST_RATIO, SURFACES, movement
 from estimators.regression.least_squares import Fit, least_squares
@@ -40,7 +40,7 @@ class Method:
     init: Callable[..., NDArray[np.void]]
     step: Callable[..., None]
     default_tuning: Callable[[], NDArray[np.void]]
-    kept: tuple[str, ...] = tuple(field[0] for field in SEEN)
+    kept: tuple[str, ...] = SEEN_NAMES
     own_errors: bool = False
 
 
@@ -127,7 +127,7 @@ def identify(
     """
     record = check(record)
     grid = common_grid(record)
-    run, *far = _run(method, grid, record, (start, *FAR), tuning, airframe)
+    run, *far = (_to_the_last_good(h) for h in _run(method, grid, record, (start, *FAR), tuning, airframe))
     lacks = absent(grid)
     moved = {
         name: movement(grid.time, grid.values[name], grid.good((name,)))
@@ -140,7 +140,7 @@ def identify(
             for i in range(FIRST[c], FIRST[c] + COUNT[c]):
                 error = float(run.memory["deviation"][-1, i] if method.own_errors else fit.std_error[i - FIRST[c]])
                 value, name = float(run.memory["theta"][-1, i]), PARAMETER_NAMES[i]
-                why = _why_not(name, channel, moved) or _why_not_converged(run, far, c, i)
+                why = _why_not(name, channel, moved) or _why_not_converged(run, far, i, len(grid.time))
                 if not why and not name.endswith("_0") and not error <= LARGEST_RATIO * abs(value):
                     why = f"its standard error {error:.2g} exceeds a third of the estimate {value:.2g}"
                 result[name] = Estimate(value, error, unit_of(name), method.name, fit.r2, not why, why)
@@ -149,6 +149,12 @@ def identify(
         drag = result["CD_0"]
         result["CD_0"] = Estimate(drag.estimate, drag.std_error, "1", method.name, drag.r2, not why, why)
     return result
+
+
+def _to_the_last_good(run: History) -> History:
+    """Without what follows the last sample at which the observer was well: a failed one may hold anything."""
+    end = int(np.flatnonzero(run.estimate["health"])[-1]) + 1 if run.estimate["health"].any() else 1
+    return History(run.time[:end], run.estimate[:end], run.memory[:end], run.tuning)
 
 
 def _fit(run: History, c: int) -> Fit:
@@ -161,16 +167,16 @@ def _fit(run: History, c: int) -> Fit:
     return least_squares(np.where(good[:, None], rows, 0.0), np.where(good, target, 0.0))
 
 
-def _why_not_converged(run: History, far: Sequence[History], c: int, i: int) -> str:
+def _why_not_converged(run: History, far: Sequence[History], i: int, steps: int) -> str:
     """Reason from the observer: it failed, or the starting value still weighs."""
-    if not run.estimate["health"][-1] > 0.0:
+    if min(len(h.time) for h in (run, *far)) < steps:
         return "the observer had failed, or could not read the last sample"
     low, high = (float(h.memory["theta"][-1, i]) for h in far)
     first, last = (float(h.memory["theta"][0, i]) for h in far)
     if abs(high - low) > CONVERGED * abs(last - first) and not np.isclose(first, last):
         return (f"no convergence: from {FAR[0]:g} and {FAR[1]:g} of the clean value it ends at {low:.3g} and "
                 f"{high:.3g}; what the record says of it is too weak to outweigh the start")  # fmt: skip
-    deviation, prior = run.memory["deviation"][-1, i], run.memory["scale"][-1, i] / np.sqrt(run.tuning["q0"][0, c])
+    deviation, prior = run.memory["deviation"][-1, i], run.memory["deviation"][0, i]
     return "the record says too little about it: its starting value still weighs" if deviation > 0.5 * prior else ""
 
 
@@ -191,7 +197,7 @@ def _why_not_drag(grid: Grid, run: History) -> str:
     """CD_0 needs thrust, and flight near zero lift: further away it is an extrapolation along the clean polar."""
     if thrust(grid.values) is None:
         return "thrust was not recorded and cannot be told from drag"
-    lift = run.memory["theta"][-1, 1] + run.memory["theta"][-1, 2] * np.asarray(grid.values["alpha"])
+    lift = run.memory["theta"][-1, 1] + run.memory["theta"][-1, 2] * grid.values["alpha"]
     nearest = float(np.nanmin(np.abs(lift)))
     if nearest > EXTRAPOLATED:
         return f"lift coefficients stay above {nearest:.2f}: zero lift is an extrapolation along the clean polar"
