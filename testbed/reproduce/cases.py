@@ -29,8 +29,7 @@ UNITS = {"CL_alpha": ("1/deg", DEGREE), "Cm_alpha": ("1/deg", DEGREE), "Cm_eleva
 
 
 @lru_cache(maxsize=32)
-def fly_case(case: str, seed: int, gust: float = GUST, count: int | None = None, vane_scale: float = 0.0
-             ) -> tuple[Window, ...]:
+def fly_case(case: str, seed: int, gust: float = GUST, count: int | None = None) -> tuple[Window, ...]:
     """Doublet sets of one sort of case.
 
     Args:
@@ -38,12 +37,11 @@ def fly_case(case: str, seed: int, gust: float = GUST, count: int | None = None,
         seed: the sets have the seeds 1000 `seed` and on.
         gust: sigma_w [m/s].
         count: how many sets; as many as the paper had by default.
-        vane_scale: scale error of the angle-of-attack vane [1].
     """
     speed, iced, printed = CASES[case]
     scenario = scenarios.load(
         "clear_air", aircraft="twin_otter_flight", duration=55.0, doublet_scale=0.78,
-        parameters={"turbulence_sigma_w": gust, "scale_alpha": vane_scale},
+        parameters={"turbulence_sigma_w": gust},
         initial={"airspeed": speed, "eta": ICE if iced else {}},
         ice_protection="off", events=({"time": 10.0, "name": "doublets", "doublets": True},))
     return tuple(fly_sets(scenario, 1000*seed + k)[0]["doublets"] for k in range(printed if count is None else count))

@@ -20,6 +20,7 @@ ITEMS: dict[str, tuple[str, str]] = {  # module of the item's `rows`, and what i
     "fig15_16": ("deicing", "selective de-icing"),
     "fig17_18": ("boots", "boots on a three-minute cycle"),
     "fig19": ("correlation", "drag and derivatives against the severity eta"),
+    "fig20": ("scale", "turbulence in the scale factor of alpha, and that in CL_alpha"),
     "fig21_22": ("trim", "trim with and without ice"),
     "fig23_26": ("starts", "H-infinity from seven starts, clear air"),
     "fig27_30": ("natural_ice", "H-infinity in natural ice"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from estimators.hinf import record as hinf_record
+from estimators.observer.record import History
 from testbed.reproduce.cases import NAMES, UNITS, airframe_at, fly_case
 from testbed.reproduce.pictures import Picture
 from testbed.reproduce.row import Row
@@ -27,12 +28,12 @@ def calm(seed: int) -> Window:
     return fly_case(CASE, seed, 0.0, 1)[0]
 
 
-def history(window: Window) -> hinf_record.History:
+def history(window: Window) -> History:
     """The observer's course from stepwise regression's values."""
     return hinf_record.history(window.record, airframe=airframe_at(window.stepwise))
 
 
-def _row(name: str, run: hinf_record.History, window: Window) -> Row:
+def _row(name: str, run: History, window: Window) -> Row:
     unit, scale = UNITS[name]
     final, steps = float(course(run, name)[-1]), scale*window.stepwise[name].estimate
     difference, bound = 100.0*(final/steps - 1.0), WITHIN[name]

@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from estimators.hinf import record as hinf_record
+from estimators.observer.record import History
 from estimators.regression import equation_error
 from icing_env.record import FlightRecord, read
 from testbed.plot_style import GREY, ROLES, legend_above, line, styled
@@ -20,7 +21,7 @@ STARTS = (0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6)  # of the published model; the pape
 SMALL = 0.1  # of the starts' spread: what "a small fraction" is taken to be (assumed)
 CASE = "clear, high V"
 RECORDED = "totter_demo_data.mat"
-Runs = list[hinf_record.History]
+Runs = list[History]
 
 
 def rows(seed: int) -> list[Row]:
@@ -33,8 +34,7 @@ def rows(seed: int) -> list[Row]:
 
 
 def records(seed: int) -> list[tuple[FlightRecord, str, str]]:
-    """The clear-air record that all seven starts see and the recorded flight where it is present; sort, and what it is.
-    """
+    """The clear-air record that all seven starts see, and a recorded flight if present; with sort and description."""
     found = [(fly_case(CASE, seed)[0].record, "simulated", "a clear-air doublet set at 140 kt")]
     path = folder()/RECORDED
     if path.is_file():
@@ -47,7 +47,7 @@ def run_all(record: FlightRecord) -> Runs:
     return [hinf_record.history(record, start=start) for start in STARTS]
 
 
-def course(run: hinf_record.History, name: str) -> NDArray[np.float64]:
+def course(run: History, name: str) -> NDArray[np.float64]:
     """Estimate of one derivative over time, in the paper's unit, shape (N,)."""
     return UNITS[name][1]*run.parameter(name)[0]
 
