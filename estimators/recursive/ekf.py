@@ -199,7 +199,7 @@ def step(memory: Any, estimate: Any, measurement: Any, airframe: Any, tuning: An
         observe(memory[i], estimate[i], measurement[i], airframe[i if len(airframe) > 1 else 0], tuning[0], dt)
 
 
-METHOD = runs.Method("extended Kalman filter", init, step, default_tuning)
+METHOD = runs.Method("extended Kalman filter", init, step, default_tuning, own_errors=True)
 
 
 def identify(
@@ -208,5 +208,9 @@ def identify(
     start: float = 1.0,
     airframe: NDArray[np.void] | None = None,
 ) -> dict[str, Estimate]:
-    """Derivatives by name at the end of the record; see `estimators.observer.record.identify`."""
+    """Derivatives by name at the end of the record; see `estimators.observer.record.identify`.
+
+    Standard errors are the filter's own: as good as d, n and `accelerometer` of its tuning, which allow for unmodelled
+    accelerations of real flight and are therefore cautious where a record has none.
+    """
     return runs.identify(METHOD, record, tuning, start, airframe)
