@@ -76,8 +76,8 @@ def _derivative(name: str, points: list[Point], how: str, text: str, sets: str) 
     agrees = size < PAPER_VALUE
     lost = len(points) - len(told)
     why = f"{len(told)} doublet sets, {sets}" + (f"; {lost} refused: no angle of attack once corrected" if lost else "")
-    return Row(ITEM, f"size of the correlation of {name} with eta, {sets} ({text})", "simulated", "not well correlated", size,
-               "1", None, agrees, f"below {PAPER_VALUE}", why if agrees else
+    return Row(ITEM, f"size of the correlation of {name} with eta, {sets} ({text})", "simulated",
+               "not well correlated", size, "1", None, agrees, f"below {PAPER_VALUE}", why if agrees else
                f"{why}; ice moves it by more than gusts do here")
 
 
