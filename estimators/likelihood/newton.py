@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
@@ -96,44 +97,99 @@ def fit(
         InputError: the model cannot be flown from `theta0`, or no channel holds a value.
     """
     problem = _Problem(simulate, measured, floor)
-    theta = np.array(theta0, dtype=np.float64)
+    end = descend(problem, np.array(theta0, dtype=np.float64), step, most)
+    residual, sensitivity = end.point.detail
+    return MaximumLikelihood(
+        theta=end.theta,
+        covariance=coloured_covariance(end.inverse, sensitivity, residual, end.point.noise, problem.present, lags),
+        covariance_white=end.inverse,
+        noise=end.point.noise,
+        residual=residual,
+        sensitivity=sensitivity,
+        cost=end.point.cost,
+        converged=end.converged,
+        reason=end.reason,
+        full_rank=end.full_rank,
+        iterations=end.iterations,
+    )
+
+
+@dataclass(frozen=True)
+class Point:
+    """The likelihood at one theta: J, -dJ/dtheta (p,), information (p, p), noise (k,), and what else was found."""
+
+    cost: float
+    gradient: FloatArray
+    information: FloatArray
+    noise: FloatArray
+    detail: tuple[FloatArray, FloatArray]
+
+
+class Problem(Protocol):
+    """What `descend` needs of a likelihood."""
+
+    def expand(self, theta: FloatArray, step: FloatArray | None) -> Point:
+        """Everything at theta (p,), by differences of half width `step` (p,)."""
+
+    def costs(self, thetas: FloatArray) -> FloatArray:
+        """J of parameter sets (m, p): (m,), infinite where the model does not fly."""
+
+
+@dataclass(frozen=True)
+class Descent:
+    """Where a descent ended, and why; `inverse` (p, p): of the information there."""
+
+    theta: FloatArray
+    point: Point
+    inverse: FloatArray
+    converged: bool
+    reason: str
+    full_rank: bool
+    iterations: int
+
+
+def descend(
+    problem: Problem, theta: FloatArray, step: FloatArray | None, most: int, limit: FloatArray | None = None
+) -> Descent:
+    """Gauss-Newton with halved steps from `theta` (p,), until all criteria hold at once or `most` steps are done.
+
+    `limit` (p,) bounds the change of each parameter in one step.
+    """
     reason, converged, change, iterations = f"no convergence in {most} steps", False, np.inf, 0
-    cost, noise, last, last_noise = np.inf, np.ones(measured.shape[1]), np.inf, np.ones(measured.shape[1])
+    last, last_noise = np.inf, np.ones(1)
     while True:
-        residual, sensitivity = problem.expand(theta, step)
-        noise = problem.noise(residual[None])[0]
-        cost = float(problem.costs(residual[None])[0])
-        information, gradient = _normal_equations(sensitivity, residual, noise)
-        inverse, full_rank = inverse_information(information)
-        move = inverse @ gradient
-        left = float(np.sqrt(max(gradient @ move, 0.0)))
-        settled = bool(np.max(np.abs(noise - last_noise) / noise) < NOISE_CHANGE)
-        if change < 1.0 and abs(cost - last) < COST_CHANGE * abs(cost) and settled and left < GRADIENT:
+        point = problem.expand(theta, step)
+        inverse, full_rank = inverse_information(point.information)
+        move = inverse @ point.gradient
+        farthest = move if limit is None else np.clip(move, -limit, limit)
+        left = float(np.sqrt(max(point.gradient @ move, 0.0)))
+        settled = bool(np.max(np.abs(point.noise - last_noise) / point.noise) < NOISE_CHANGE)
+        if change < 1.0 and abs(point.cost - last) < COST_CHANGE * abs(point.cost) and settled and left < GRADIENT:
             converged, reason = True, f"converged in {iterations} steps"
             break
         if iterations >= most:
             break
-        taken = problem.shorten(theta, move, cost)
+        taken = _shorten(problem, theta, farthest, point.cost)
         if taken is None:
             # Nothing along the step is better: at the bottom up to rounding, or stuck.
             converged = left < GRADIENT
             reason = f"converged in {iterations} steps" if converged else "stopped: no step reduces the cost"
             break
         change = float(np.max(np.abs(taken - theta) / np.maximum(LARGEST_CHANGE * np.abs(theta), SMALLEST_CHANGE)))
-        theta, last, last_noise, iterations = taken, cost, noise, iterations + 1
-    return MaximumLikelihood(
-        theta=theta,
-        covariance=coloured_covariance(inverse, sensitivity, residual, noise, problem.present, lags),
-        covariance_white=inverse,
-        noise=noise,
-        residual=residual,
-        sensitivity=sensitivity,
-        cost=cost,
-        converged=converged and full_rank,
-        reason=reason if full_rank else f"{reason}; some parameters cannot be told apart",
-        full_rank=full_rank,
-        iterations=iterations,
-    )
+        theta, last, last_noise, iterations = taken, point.cost, point.noise, iterations + 1
+    if not full_rank:
+        converged, reason = False, f"{reason}; some parameters cannot be told apart"
+    return Descent(theta, point, inverse, converged, reason, full_rank, iterations)
+
+
+def _shorten(problem: Problem, theta: FloatArray, move: FloatArray, cost: float) -> FloatArray | None:
+    """The first of the halved steps that lowers the cost; None if none does."""
+    full = np.asarray(theta + move, dtype=np.float64)
+    if problem.costs(full[None])[0] < cost:
+        return full
+    thetas = theta + move * 0.5 ** np.arange(1, HALVINGS)[:, None]
+    better = np.flatnonzero(problem.costs(thetas) < cost)
+    return np.asarray(thetas[better[0]], dtype=np.float64) if len(better) else None
 
 
 class _Problem:
@@ -154,19 +210,18 @@ class _Problem:
         """Measured minus model, (m, N, k)."""
         return np.where(self.present, self.measured - self.simulate(thetas), 0.0)
 
-    def noise(self, residuals: FloatArray) -> FloatArray:
-        """Mean squares of residuals (m, N, k), not below the floor: (m, k)."""
-        return np.maximum(np.sum(residuals**2, axis=1) / self.count, self.least)
+    def costs(self, thetas: FloatArray) -> FloatArray:
+        """J of parameter sets (m, p) with R at its best: (m,); infinite where the model did not fly."""
+        return self._costs(self.residuals(thetas))
 
-    def costs(self, residuals: FloatArray) -> FloatArray:
-        """J of residuals (m, N, k) with R at its best: (m,); infinite where the model did not fly."""
+    def _costs(self, residuals: FloatArray) -> FloatArray:
         squares = np.sum(residuals**2, axis=1)
         noise = np.maximum(squares / self.count, self.least)
         cost = 0.5 * np.sum(squares / noise + self.count * np.log(noise), axis=1)
         return np.where(np.isfinite(cost), cost, np.inf)
 
-    def expand(self, theta: FloatArray, step: FloatArray | None) -> tuple[FloatArray, FloatArray]:
-        """Residual (N, k) at theta and sensitivities (N, k, p) about it."""
+    def expand(self, theta: FloatArray, step: FloatArray | None) -> Point:
+        """J, gradient, information, R, and as detail the residual (N, k) and the sensitivities (N, k, p)."""
         width = np.maximum(0.01 * np.abs(theta), 1e-4) if step is None else np.asarray(step, dtype=np.float64)
         p = len(theta)
         thetas = np.concatenate((theta[None], theta + np.diag(width), theta - np.diag(width)))
@@ -174,16 +229,11 @@ class _Problem:
         if not np.isfinite(residuals).all():
             raise InputError("maximum likelihood: the model cannot be flown with these parameters; start elsewhere")
         slopes = (residuals[1 + p :] - residuals[1 : 1 + p]) / (2.0 * width[:, None, None])
-        return residuals[0], np.ascontiguousarray(np.moveaxis(slopes, 0, 2))
-
-    def shorten(self, theta: FloatArray, move: FloatArray, cost: float) -> FloatArray | None:
-        """The first of the halved steps that lowers the cost; None if none does."""
-        full = theta + move
-        if self.costs(self.residuals(full[None]))[0] < cost:
-            return np.asarray(full, dtype=np.float64)
-        thetas = theta + move * 0.5 ** np.arange(1, HALVINGS)[:, None]
-        better = np.flatnonzero(self.costs(self.residuals(thetas)) < cost)
-        return thetas[better[0]] if len(better) else None
+        sensitivity = np.ascontiguousarray(np.moveaxis(slopes, 0, 2))
+        noise = np.maximum(np.sum(residuals[0] ** 2, axis=0) / self.count, self.least)
+        information, gradient = _normal_equations(sensitivity, residuals[0], noise)
+        cost = float(self._costs(residuals[:1])[0])
+        return Point(cost, gradient, information, noise, (residuals[0], sensitivity))
 
 
 def _normal_equations(

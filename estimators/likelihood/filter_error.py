@@ -1,0 +1,156 @@
+"""Filter error: output error for turbulence, with the gust estimated along the way.
+
+A Kalman filter flies the model, the gust of MIL-F-8785C (Dryden form) being two of its states and what the tail meets
+of it a third; its innovations are white if the derivatives, the intensity of the gust and the noise of every channel
+are right, and their likelihood is maximised over all of them:
+
+    J = 1/2 sum (v^2/s + ln s),    M = sum dv dv'/s + 1/2 sum ds ds'/s^2
+
+with innovations v and variances s taken one measurement after another. In calm air it is output error. Sources:
+Jategaonkar, Flight Vehicle System Identification (AIAA 2006), chapter 5; Klein & Morelli, Aircraft System
+Identification (AIAA 2006), section 6.2; Maine and Iliff, NASA RP-1168.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimators.estimate import Estimate
+from estimators.likelihood.equations import FIRST_GUST, STATES
+from estimators.likelihood.inputs import OUTPUTS, Flown, flown
+from estimators.likelihood.model import COUNT, NAMES, Model, model, quasi_steady
+from estimators.likelihood.newton import Point, descend
+from estimators.likelihood.output_error import FEW, MOST, axes, best_flight, r_squared, starting_values
+from estimators.likelihood.report import Found, estimates
+from estimators.likelihood.simulate import filtered_flight
+from estimators.regression.equations import EXCITED, SURFACES, movement
+from estimators.signals.coefficients import Airframe, airframe_of
+from estimators.signals.data_checks import check
+from estimators.signals.resample import common_grid
+from icing_env.errors import InputError
+from icing_env.record import FlightRecord, FloatArray
+
+METHOD = "filter error"
+# Standard deviations of the first state: m/s across, rad/s, rad. Within what the first samples tell of it (assumed).
+SPREAD = {"longitudinal": (1.0, 0.02, 0.01, 0.01), "lateral": (1.0, 0.02, 0.02, 0.01)}
+GUST, DRIVE, ACROSS = 0.3, 1e-5, 1e-6  # start: m/s, rad2/s3; and unmodelled acceleration across, m2/s3, held (assumed)
+# What is known beforehand, as standard deviations about zero or the start: in turbulence the kinematics no longer tell
+# an error of the vane from a gust, and in calm air the record does not show the gust's intensity (assumed).
+WIDE, SCALE, LAG, BIAS = 3.0, 0.03, 0.03, 0.1  # of the logarithm of an intensity; 1; s; m/s2
+LOG_STEP, LARGEST_LOG, FIRST_STEPS = 0.05, 1.0, 10
+
+
+def identify(record: FlightRecord, start: float | None = 1.0, default: Airframe | None = None) -> dict[str, Estimate]:
+    """Derivatives by name as for output error, and `sigma_gust_w`, `sigma_gust_v` (m/s), the gusts' intensity.
+
+    Args:
+        start: factor on the published derivatives of the clean aircraft to start from; None starts from equation error.
+        default: the airframe for what the record does not state.
+
+    Raises:
+        InputError: the record is refused by `data_checks.check` or lacks the channels of both axes.
+    """
+    record = check(record)
+    grid = common_grid(record)
+    airframe, first = airframe_of(record, default), starting_values(record, start, default)
+    result: dict[str, Estimate] = {}
+    for axis in axes(grid, record.meta.name):
+        flight = flown(grid, airframe, axis)
+        starts = tuple(n for n in ("start_w", "start_q", "start_theta", "start_v", "start_p", "start_r", "start_phi"))
+        likelihood = begin(model(flight, first, starts), model(flight, first))
+        moved = any(movement(grid.time, grid.values[n], grid.good((n,))) >= EXCITED for n in SURFACES[axis])
+        result.update(estimates(likelihood.found(MOST if moved else FEW), grid, METHOD))
+    return result
+
+
+def begin(plan: Model, free: Model) -> "Likelihood":
+    """The likelihood of `plan`, to start where a few steps of output error on `free` lead."""
+    best, there = best_flight(free, FIRST_STEPS)
+    values = dict(zip(free.free_names, best.theta, strict=True))
+    theta = np.array([values[n] if n[0] == "C" else 0.0 for n in plan.free_names])
+    noise = best.noise
+    return Likelihood(plan, np.concatenate((theta, np.log([GUST, DRIVE, *noise]))))
+
+
+@dataclass(frozen=True)
+class Likelihood:
+    """Of a model's free parameters, then the logarithms of gust intensity, drive and noise variances.
+
+    `start` (p,): where the search begins, and about which the intensities are known beforehand.
+    """
+
+    plan: Model
+    start: FloatArray
+
+    @property
+    def there(self) -> list[int]:
+        """Outputs that were measured."""
+        return [i for i, column in enumerate(self.plan.flown.measured.T) if np.isfinite(column).any()]
+
+    def fly(self, thetas: FloatArray) -> FloatArray:
+        """Innovations and their variances, (2, m, M, outputs that are there)."""
+        flight, p, count = self.plan.flown, len(self.plan.free), len(NAMES[self.plan.flown.axis])
+        whole, logs = self.plan.spread(thetas[:, :p])[:, :count], np.exp(np.clip(thetas[:, p:], -40.0, 20.0))
+        noises, drives = np.ones((len(thetas), flight.measured.shape[1])), np.empty((len(thetas), 3))
+        noises[:, self.there] = logs[:, 2:]
+        drives[:, 0], drives[:, 1], drives[:, 2] = logs[:, 0], ACROSS, logs[:, 1]
+        first, spread = np.zeros(STATES), np.zeros(STATES)
+        first[: COUNT[flight.axis]], spread[:FIRST_GUST] = flight.start, SPREAD[flight.axis]
+        steady = bool(np.isfinite(flight.measured[:: flight.thin, self.there]).all())
+        out = filtered_flight(flight.index, np.ascontiguousarray(whole), noises, drives, first, spread, flight.data,
+                              flight.inverse, flight.measured, flight.thin, steady, flight.dt)  # fmt: skip
+        return np.asarray(out[:, :, :, self.there], dtype=np.float64)
+
+    @property
+    def spread(self) -> FloatArray:
+        """Standard deviations of what is known beforehand; infinite for the derivatives."""
+        known = {"scale": SCALE, "lag": LAG, "az": BIAS, "ay": BIAS}
+        of = [known.get(name.split("_")[-1], np.inf) if name[0] != "C" else np.inf for name in self.plan.free_names]
+        return np.array([*of, *[WIDE] * (2 + len(self.there))])
+
+    def _prior(self, thetas: FloatArray) -> FloatArray:
+        """Distance from what is known beforehand in its standard deviations, shaped as `thetas`."""
+        return np.asarray((thetas - self.start) / self.spread, dtype=np.float64)
+
+    def costs(self, thetas: FloatArray) -> FloatArray:
+        """J of parameter sets (m, p); infinite where the filter did not hold."""
+        v, s = self.fly(thetas)
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            cost = 0.5 * np.sum(v * v / s + np.log(s), axis=(1, 2)) + 0.5 * np.sum(self._prior(thetas) ** 2, axis=1)
+        return np.where(np.isfinite(cost), cost, np.inf)
+
+    def expand(self, theta: FloatArray, step: FloatArray | None) -> Point:
+        """J, gradient and information; as detail the innovations and their variances."""
+        p, q = len(theta), len(self.plan.free)
+        width = np.concatenate((self.plan.step(theta[:q]), np.full(p - q, LOG_STEP))) if step is None else step
+        v, s = self.fly(np.concatenate((theta[None], theta + np.diag(width), theta - np.diag(width))))
+        if not (np.isfinite(v).all() and np.isfinite(s).all()):
+            raise InputError("filter error: the model cannot be flown with these parameters; start elsewhere")
+        scale = 2.0 * width[:, None, None]
+        root = np.sqrt(s[0])
+        dv = ((v[1 : 1 + p] - v[1 + p :]) / scale / root).reshape(p, -1)
+        ds = ((s[1 : 1 + p] - s[1 + p :]) / scale / s[0]).reshape(p, -1)
+        whitened = (v[0] / root).ravel()
+        prior = self._prior(theta)
+        gradient = -dv @ whitened - 0.5 * ds @ (1.0 - whitened**2) - prior / self.spread
+        information = dv @ dv.T + 0.5 * ds @ ds.T + np.diag(self.spread**-2.0)
+        cost = float(0.5 * np.sum(whitened**2) + 0.5 * np.sum(np.log(s[0])) + 0.5 * np.sum(prior**2))
+        return Point(cost, gradient, information, np.mean(s[0], axis=0), (v[0], s[0]))
+
+    def found(self, most: int) -> Found:
+        """The fit in at most so many steps."""
+        plan, q, start = self.plan, len(self.plan.free), self.start
+        limit = np.where(np.arange(len(start)) < q, np.inf, LARGEST_LOG)
+        end = descend(self, start, None, most, limit)
+        theta, covariance = quasi_steady(plan, end.theta[:q], end.inverse[:q, :q])
+        gust = float(np.exp(end.theta[q]))
+        names = (*plan.free_names, f"sigma_gust_{'w' if plan.flown.axis == 'longitudinal' else 'v'}")
+        wider = np.zeros((q + 1, q + 1))
+        wider[:q, :q], wider[q, q] = covariance, gust**2 * end.inverse[q, q]
+        measured = plan.flown.measured[:: plan.flown.thin][:, self.there]
+        outputs = [OUTPUTS[plan.flown.axis][i] for i in self.there]
+        failure = "" if end.converged else f"filter error did not converge: {end.reason}"
+        return Found(plan.flown.axis, names, np.append(theta, gust), wider,
+                     r_squared(end.point.detail[0], measured, outputs), failure)  # fmt: skip
