@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,10 @@ from hypothesis import strategies as st
 
 from estimators.regression.equation_error import identify
 from estimators.signals.data_checks import check
+from icing_env import scenario as scenarios
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, read, write
+from testbed.flight import fly
 
 
 def with_channel(record: FlightRecord, name: str, values: np.ndarray) -> FlightRecord:
@@ -201,3 +204,101 @@ def test_reversed_sign_in_a_recorded_flight_is_refused(name: str) -> None:
     record = read(flight_data("totter_demo_data.mat"))
     with pytest.raises(InputError, match="sign reversed"):
         check(with_channel(record, name, -record[name]))
+
+
+@cache
+def doublets(sigma: float, airspeed: float = 55.0) -> FlightRecord:
+    """A simulated set of doublets in all three axes, in turbulence."""
+    scenario = scenarios.load("clear_air", aircraft="twin_otter_flight", duration=57.0, doublet_scale=0.78,
+                              parameters={"turbulence_sigma_w": sigma}, initial={"airspeed": airspeed})  # fmt: skip
+    record = fly(scenario, seed=3, observer=False, protection=False).record
+    return record.take(record.time >= 5.0)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 2.0])
+@pytest.mark.parametrize(
+    ("name", "factor", "message"),
+    [
+        ("alpha", -1.0, "'alpha' has its sign reversed"), ("beta", -1.0, "'beta'.? has its sign reversed"),
+        ("ay", -1.0, "'ay' .*has its sign reversed"), ("r", -1.0, "'r' .*has its sign reversed"),
+        ("psi", -1.0, "'psi'.? has its sign reversed"), ("ax", -1.0, "'ax' has its sign reversed"),
+        ("elevator", -1.0, "'elevator' has its sign reversed: a positive one raises q"),
+        ("aileron", -1.0, "'aileron' has its sign reversed"), ("rudder", -1.0, "'rudder' has its sign reversed"),
+        ("airspeed", 1.9438, "'airspeed' looks like knots"), ("airspeed", 3.2808, "'airspeed' looks like ft/s"),
+        ("ay", 1 / 9.80665, "'ay' looks like g"), ("r", 57.29578, "not both in rad|degrees per second"),
+        ("beta", 57.29578, "'beta' looks like degrees"),
+    ],
+)  # fmt: skip
+def test_the_motion_betrays_wrong_signs_and_units_in_turbulence_too(
+    name: str, factor: float, message: str, sigma: float
+) -> None:
+    record = doublets(sigma)
+    with pytest.raises(InputError, match=message):
+        check(with_channel(record, name, record[name] * factor))
+
+
+def test_without_ground_speed_the_turn_of_the_flow_betrays_the_unit_of_airspeed() -> None:
+    record = doublets(0.0)
+    alone = replace(record, channels={n: v for n, v in record.channels.items() if n != "ground_speed"})
+    with pytest.raises(InputError, match="'airspeed' looks like knots: az turns the flow"):
+        check(with_channel(alone, "airspeed", 1.9438 * record["airspeed"]))
+
+
+@pytest.mark.parametrize("sigma", [0.0, 1.0, 2.0, 4.0])
+@pytest.mark.parametrize("airspeed", [55.0, 72.0])
+def test_sound_records_in_turbulence_are_not_refused(sigma: float, airspeed: float) -> None:
+    record = doublets(sigma, airspeed)
+    check(record)
+    for start in (8.0, 28.0):
+        check(record.take((record.time >= start) & (record.time < start + 20.0)))
+
+
+FAULTS = ("constant", "gap", "spike", "reversed", "unit", "few", "nan run", "repeated", "frozen", "all missing")
+
+
+sound = cache(longitudinal)
+
+
+def spoil(record: FlightRecord, fault: str, name: str, rng: np.random.Generator) -> FlightRecord:
+    """`record` with one fault in one channel, at a place drawn."""
+    values, at = record[name].copy(), int(rng.integers(50, 400))
+    if fault == "few":
+        return record.take(slice(at, at + 3))
+    if fault == "repeated":
+        return record.take(np.sort(np.append(np.arange(len(record)), [at, at + 1])))
+    if fault == "constant":
+        values[:] = values[0]
+    elif fault in ("gap", "nan run"):
+        values[at : at + (60 if fault == "gap" else 4)] = np.nan
+    elif fault == "spike":
+        values[at] += {"az": 25.0}.get(name, 0.6)
+    elif fault == "frozen":
+        values[60:140] = values[60]
+    elif fault == "all missing":
+        values[:] = np.nan
+    else:
+        values *= -1.0 if fault == "reversed" else {"az": 3.2808}.get(name, 57.29578)
+    return with_channel(record, name, values)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.sampled_from(FAULTS), st.sampled_from(["alpha", "q", "theta", "az"]), st.integers(0, 10_000))
+def test_every_fault_is_named_or_refused_and_never_passes_unseen(fault: str, name: str, seed: int) -> None:
+    record = spoil(sound(seed % 3), fault, name, np.random.default_rng(seed))
+    try:
+        mended = check(record)
+    except InputError as error:
+        assert len(str(error).splitlines()) == 1
+        named = (f"'{name}'" in str(error), fault == "few" and "3 samples" in str(error), name in str(error))
+        assert any(named) and fault not in ("spike", "gap", "nan run", "repeated", "frozen")
+        return
+    if fault == "all missing":
+        assert not mended.has(name)
+        return
+    assert fault not in ("few", "reversed", "unit")
+    channel = "time" if fault == "repeated" else name
+    told = [p for p in mended.problems if p.channel == channel]
+    assert told and all(p.repaired for p in told), fault
+    found = identify(mended) if mended.has("alpha") and mended.has("q") and mended.has("az") else {}
+    if found:
+        assert found["Cm_alpha"].estimate == pytest.approx(PITCH["Cm_alpha"], rel=0.08)

@@ -2,8 +2,8 @@
 
 Mended: repeated instants (dropped), constant channels (set aside), frozen stretches and spikes (left out,
 interpolated where short). Refused: too few samples, time running backwards, a wrong unit, a reversed sign. Signs and
-units are judged by kinematics: theta_dot against q, phi_dot against p, az against alpha. Thresholds are assumed; they
-leave clean records with sensor noise and turbulence untouched.
+units are judged by the motion (estimators.signals.kinematic_checks). Thresholds are assumed; they leave clean records
+with sensor noise and turbulence untouched.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from estimators.signals.differentiate import half_width, slope, smooth
+from estimators.signals.kinematic_checks import check_kinematics
 from estimators.signals.resample import common_grid
 from icing_env.errors import InputError
 from icing_env.record import DataProblem, FlightRecord, FloatArray
@@ -44,7 +44,7 @@ def check(record: FlightRecord) -> FlightRecord:
     _check_units(record)
     record = _without_constants(record)
     record = _without_frozen(_without_spikes(record))
-    _check_kinematics(record)
+    check_kinematics(record)
     known = set(record.problems)
     return record.with_problems(p for p in common_grid(record).problems if p not in known)
 
@@ -71,6 +71,9 @@ def _check_units(record: FlightRecord) -> None:
         az = float(np.nanmedian(record["az"]))
         if abs(az) < 2.0:
             raise InputError(f"{where}: column 'az' looks like g: median {az:.3g}; level flight reads -9.8 m/s2")
+        if abs(az) > 20.0:
+            unit = "looks like ft/s2" if 28.0 < abs(az) < 36.0 else "is not in m/s2"
+            raise InputError(f"{where}: column 'az' {unit}: median {az:.3g}; level flight reads -9.8 m/s2")
         if az > 0:
             raise InputError(f"{where}: column 'az' has its sign reversed: median {az:.3g}; level flight reads -9.8")
     for name, least, unit in (("temperature", 150.0, "Celsius"), ("pressure", 2000.0, "hPa")):
@@ -144,50 +147,3 @@ def _moves(record: FlightRecord, rows: NDArray[np.intp], names: list[str]) -> bo
     return any(
         np.isfinite(record[n][rows]).any() and np.nanstd(record[n][rows]) > np.nanstd(record[n]) / 3.0 for n in names
     )
-
-
-def _check_kinematics(record: FlightRecord) -> None:
-    """Refuse reversed signs and wrong units that the motion itself contradicts."""
-    grid = common_grid(record)
-    v, half, where = grid.values, half_width(grid.dt), f"record '{record.meta.name}'"
-    zero = np.zeros(len(grid.time))
-    phi, theta, r = v.get("phi", zero), v.get("theta", zero), v.get("r", zero)
-    if "theta" in v and "q" in v:
-        expected = smooth(v["q"] * np.cos(phi) - r * np.sin(phi), half)
-        _judge(where, "q", "theta", slope(theta, grid.dt, half), expected, grid.good(("theta", "q")))
-    if "phi" in v and "p" in v:
-        turn = np.tan(theta) * (v.get("q", zero) * np.sin(phi) + r * np.cos(phi))
-        _judge(where, "p", "phi", slope(phi, grid.dt, half), smooth(v["p"] + turn, half), grid.good(("phi", "p")))
-    if all(name in v for name in ("alpha", "az", "airspeed")) and np.max(v["alpha"]) < 0.2:
-        lift = v["az"] / v["airspeed"] ** 2  # per its mean: CL/mean(CL), which rises with alpha below the stall
-        good = grid.good(("alpha", "az", "airspeed"))
-        gain, match = _line(v["alpha"][good], lift[good] / np.mean(lift[good]))
-        if match < -0.7:
-            raise InputError(f"{where}: column 'alpha' has its sign reversed: lift falls as alpha rises")
-        if match > 0.7 and gain < 1.5 and np.std(v["alpha"]) > 0.01:
-            raise InputError(f"{where}: column 'alpha' looks like degrees: lift grows by {gain:.2g} of itself per unit")
-
-
-def _judge(
-    where: str, rate: str, angle: str, change: FloatArray, expected: FloatArray, good: NDArray[np.bool_]
-) -> None:
-    """Compare the change of an angle with the rate that should make it (rad/s, each (N,))."""
-    rows = good & np.isfinite(change) & np.isfinite(expected)
-    if rows.sum() < FEWEST or max(np.std(change[rows]), np.std(expected[rows])) < 0.005:
-        return
-    gain, match = _line(expected[rows], change[rows])
-    if match < -0.7:
-        raise InputError(
-            f"{where}: '{rate}' (or '{angle}') has its sign reversed: {angle} changes at {gain:.2f} {rate}"
-        )
-    if match > 0.7 and not 0.2 < gain < 5.0:
-        raise InputError(f"{where}: '{angle}' and '{rate}' are not both in rad: {angle} changes at {gain:.3g} {rate}")
-
-
-def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
-    """Slope and correlation of y over x; zeros where either is constant."""
-    spread = float(np.std(x) * np.std(y))
-    if len(x) < FEWEST or spread == 0.0:
-        return 0.0, 0.0
-    covariance = float(np.mean((x - x.mean()) * (y - y.mean())))
-    return covariance / float(np.var(x)), covariance / spread
