@@ -19,8 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icing_env.jit import entry, kernel
+from icing_env.memory import matrix, rows
 from icing_env.observation import Axes
+from icing_env.tasks import TASK
+from icing_env.types import COMMAND, TARGET
 
+ACTION, COLUMN = np.dtype(np.float32), np.dtype(np.int64)
 Mode = Literal["surfaces", "targets"]
 ELEVATOR, AILERON, RUDDER, THROTTLE = 0.25, 0.29, 0.28, 1.0  # rad, rad, rad, 1: change at full action
 CLIMB_RATE, AIRSPEED, BANK = 8.0, 15.0, math.radians(45.0)  # m/s, m/s, rad at full action
@@ -56,15 +60,30 @@ def first_bad_row(action: Any) -> int:
     return -1
 
 
-@entry
-def check(action: Any) -> int:
-    """`first_bad_row`, from Python."""
-    return first_bad_row(action)
+@kernel
+def actions_of(table: Any) -> tuple:
+    """The actions [n, covered] and the column of each in them, the first two arrays of a table (`icing_env.memory`)."""
+    column = rows(table, 1, COLUMN)
+    covered = 0
+    for k in range(len(column)):
+        covered = max(covered, column[k] + 1)
+    return matrix(table, 0, covered, ACTION), column
 
 
 @entry
-def to_surfaces(action: Any, column: Any, trim: Any, command: Any) -> int:
-    """Surface commands of every row from the action, around the trim; the result of `first_bad_row`."""
+def check(table: Any) -> int:
+    """`first_bad_row` of the actions of a table."""
+    return first_bad_row(actions_of(table)[0])
+
+
+@entry
+def to_surfaces(table: Any) -> int:
+    """Surface commands of every row from the action, around the trim; the result of `first_bad_row`.
+
+    Table: actions, columns, trimmed commands, commands.
+    """
+    action, column = actions_of(table)
+    trim, command = rows(table, 2, COMMAND), rows(table, 3, COMMAND)
     bad = first_bad_row(action)
     for i in range(len(command) if bad < 0 else 0):
         c, t = command[i], trim[i]
@@ -81,8 +100,13 @@ def to_surfaces(action: Any, column: Any, trim: Any, command: Any) -> int:
 
 
 @entry
-def to_targets(action: Any, column: Any, task: Any, target: Any) -> int:
-    """Autopilot targets of every row from the action; the result of `first_bad_row`."""
+def to_targets(table: Any) -> int:
+    """Autopilot targets of every row from the action; the result of `first_bad_row`.
+
+    Table: actions, columns, tasks, targets.
+    """
+    action, column = actions_of(table)
+    task, target = rows(table, 2, TASK), rows(table, 3, TARGET)
     bad = first_bad_row(action)
     for i in range(len(target) if bad < 0 else 0):
         g, k = target[i], task[i]

@@ -52,13 +52,13 @@ def static_air_near(altitude: float, pascal_there: float, per_kelvin_there: floa
     """`static_air` at an altitude [m] near that of `place_of_static_air`, without exponential and logarithm.
 
     p = p_there (T/T_there)^EXPONENT (US 1976 eq. 33a) as a binomial series in T/T_there - 1: within 13 m its fifth
-    term is below rounding. Farther away, and above the tropopause, the equation itself.
+    term is below rounding. Returns temperature, pressure, and whether it holds: not farther away, and not above the
+    tropopause.
     """
     kelvin = T0 - LAPSE*(EARTH_RADIUS*altitude/(EARTH_RADIUS + altitude))
     x = kelvin*per_kelvin_there - 1.0
-    if abs(x) > NEAR or kelvin < T11:
-        return static_air(altitude)
-    return kelvin, pascal_there*(1.0 + x*(BINOMIAL1 + x*(BINOMIAL2 + x*(BINOMIAL3 + x*BINOMIAL4))))
+    pascal = pascal_there*(1.0 + x*(BINOMIAL1 + x*(BINOMIAL2 + x*(BINOMIAL3 + x*BINOMIAL4))))
+    return kelvin, pascal, abs(x) <= NEAR and kelvin >= T11
 
 
 @kernel

@@ -14,8 +14,8 @@ from typing import Any
 
 from icing_env.actuators import aileron_hinge_moment, elevator_hinge_moment, floated, surface_rate
 from icing_env.aerodynamics import CT_MAX, lateral, longitudinal, separation, smootherstep, tail_angle
-from icing_env.atmosphere import GAS_CONSTANT, gravity, place_of_static_air, static_air_near
-from icing_env.frames import direction_cosines, to_body, to_local
+from icing_env.atmosphere import GAS_CONSTANT, gravity, place_of_static_air, static_air, static_air_near
+from icing_env.frames import angle_of, direction_cosines, to_body, to_local
 from icing_env.jit import block, kernel
 from icing_env.propulsion import power_available, thrust_per_power
 from icing_env.severity import iced_aircraft
@@ -47,28 +47,36 @@ def air_data(x: Any, attitude: tuple, s: Any, p: Any) -> tuple:
 
     Inertial velocity less wind less gust; `attitude`: the direction cosines.
     """
-    north, east, down = wind(x.altitude, p)
-    wx, wy, wz = 0.0, 0.0, 0.0
-    if north != 0.0 or east != 0.0 or down != 0.0:  # in still air the rotation would cost a twentieth of a step
-        wx, wy, wz = to_body(attitude, north, east, down)
+    wx, wy, wz = to_body(attitude, *wind(x.altitude, p))
     ua, va, wa = x.u - wx - s.gust_u, x.v - wy - s.gust_v, x.w - wz - s.gust_w
     plane = math.sqrt(ua*ua + wa*wa)
     airspeed = math.sqrt(plane*plane + va*va)
     slowness = 1.0/max(airspeed, AIRSPEED_FLOOR)
     per_plane = 1.0/max(plane, 1e-9)
     sine, cosine = wa*per_plane, ua*per_plane
-    # asin is exact to rounding below 45 deg and three times faster than atan2
-    alpha = math.asin(sine) if abs(wa) < ua else math.atan2(wa, ua)
-    beta = math.asin(min(max(va*slowness, -1.0), 1.0))
-    return airspeed, alpha, beta, sine, cosine, ua, va, wa, slowness
+    return airspeed, angle_of(wa, ua), angle_of(va, plane), sine, cosine, ua, va, wa, slowness
 
 
 @kernel
 def meet_air(x: Any, attitude: tuple, s: Any, c: Any, p: Any) -> tuple:
     """The air that the aircraft meets: density [kg/m3], static pressure [Pa], and what `air_data` returns."""
-    kelvin, static = static_air_near(x.altitude, c.standard_pressure, c.per_standard_temperature)
-    density = p.density_factor*static/(GAS_CONSTANT*(kelvin + p.temperature_offset))
-    return (density, static, *air_data(x, attitude, s, p))
+    kelvin, static, holds = static_air_near(x.altitude, c.standard_pressure, c.per_standard_temperature)
+    if not holds:
+        kelvin, static = static_air(x.altitude)
+    return (air_density(kelvin, static, p), static, *air_data(x, attitude, s, p))
+
+
+@kernel
+def meet_air_near(x: Any, attitude: tuple, s: Any, c: Any, p: Any) -> tuple:
+    """`meet_air` by the series alone, and whether that holds: straight-line code, for aircraft side by side."""
+    kelvin, static, holds = static_air_near(x.altitude, c.standard_pressure, c.per_standard_temperature)
+    return (air_density(kelvin, static, p), static, *air_data(x, attitude, s, p)), holds
+
+
+@kernel
+def air_density(kelvin: float, static: float, p: Any) -> float:
+    """Density [kg/m3] of air of a standard temperature [K] at a static pressure [Pa]."""
+    return p.density_factor*static/(GAS_CONSTANT*(kelvin + p.temperature_offset))
 
 
 @kernel

@@ -8,6 +8,27 @@ import math
 
 from icing_env.jit import kernel
 
+# atan(t) = t + t z P(z)/Q(z), z = t^2, |t| <= 0.66: coefficients of S. L. Moshier, Cephes Mathematical Library, atan.c
+FAR = 0.66
+P4, P3, P2 = -8.750608600031904122785e-1, -1.615753718733365076637e1, -7.500855792314704667340e1
+P1, P0 = -1.228866684490136173410e2, -6.485021904942025371773e1
+Q4, Q3, Q2 = 2.485846490142306297962e1, 1.650270098316988542046e2, 4.328810604912902668951e2
+Q1, Q0 = 4.853903996359136964868e2, 1.945506571482613964425e2
+
+
+@kernel
+def angle_of(y: float, x: float) -> float:
+    """`math.atan2(y, x)` within 2 units in the last place; without a call, so that aircraft can be met side by side."""
+    small, large = min(abs(x), abs(y)), max(abs(x), abs(y), 1e-300)
+    far = small > FAR*large
+    t = (small - large if far else small)/(small + large if far else large)
+    z = t*t
+    series = ((((P4*z + P3)*z + P2)*z + P1)*z + P0)/(((((z + Q4)*z + Q3)*z + Q2)*z + Q1)*z + Q0)
+    angle = (0.25*math.pi if far else 0.0) + (t + t*z*series)
+    angle = 0.5*math.pi - angle if abs(y) > abs(x) else angle
+    angle = math.pi - angle if x < 0.0 else angle
+    return -angle if y < 0.0 else angle
+
 
 @kernel
 def direction_cosines(e0: float, e1: float, e2: float, e3: float) -> tuple:

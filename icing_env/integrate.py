@@ -1,10 +1,7 @@
 """The classical fourth-order Runge-Kutta step of the continuous state (Press et al., Numerical Recipes, section 17.1).
 
-A few aircraft advance together, phase by phase (the air they meet, the rates, the sums): the equations of one are a
-long chain of dependent operations, and the processor fills waiting time with those of the next (measured: a step of
-eight together takes 6 to 12 % less than one after another). Each aircraft's arithmetic is the same in any company.
-
-The equations name the fields of records; the weighted sums run over the same memory as rows of numbers, in vectors.
+Gusts, ice and commands are held. This is the step of one aircraft in its records; `icing_env.blocks` has that of
+several side by side.
 """
 
 from __future__ import annotations
@@ -12,52 +9,34 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from icing_env.dynamics import meet_air, rates
 from icing_env.frames import direction_cosines
 from icing_env.jit import kernel
-from icing_env.types import N_CONTINUOUS
 
-TOGETHER = 8  # aircraft that advance side by side
 STAGES = 4
-START, TRIAL, SLOPE, TOTAL, AIR = 0, 1, 2, 3, 4  # the records of one aircraft; AIR holds what `meet_air` returns
-RECORDS = 5
+START, TRIAL, SLOPE, TOTAL = 0, 1, 2, 3  # the records of one aircraft
+RECORDS = 4
 AHEAD = (0.5, 0.5, 1.0, 0.0)  # where the next slope is taken, in steps
 WEIGHT = (1.0/6.0, 1.0/3.0, 1.0/3.0, 1.0/6.0)
 
 
 @kernel
-def put(row: Any, target: int, source: int, size: int) -> None:
-    """Copy one record onto another, in one aircraft's row of numbers.
+def put(numbers: Any, target: int, source: int, size: int) -> None:
+    """Copy one record onto another in a row of numbers that holds records of `size` numbers.
 
-    `size` is N_CONTINUOUS; being an argument it keeps the compiler from unrolling what it can turn into vectors.
+    `size` being an argument keeps the compiler from unrolling what it can turn into vectors.
     """
     for n in range(size):
-        row[n + target*N_CONTINUOUS] = row[n + source*N_CONTINUOUS]
+        numbers[n + target*size] = numbers[n + source*size]
 
 
 @kernel
-def move(row: Any, ahead: float, weight: float, size: int) -> None:
-    """Trial = start + ahead slope, total = total + weight slope, in one aircraft's row of numbers; `size` as above."""
+def move(numbers: Any, ahead: float, weight: float, size: int) -> None:
+    """Trial = start + ahead slope, total = total + weight slope; as `put`."""
     for n in range(size):
-        slope = row[n + SLOPE*N_CONTINUOUS]
-        row[n + TOTAL*N_CONTINUOUS] += weight*slope
-        row[n + TRIAL*N_CONTINUOUS] = row[n + START*N_CONTINUOUS] + ahead*slope
-
-
-@kernel
-def store(row: Any, air: tuple) -> None:
-    """Put the numbers of `meet_air` away."""
-    for n in range(len(air)):
-        row[n] = air[n]
-
-
-@kernel
-def recall(row: Any) -> tuple:
-    """The numbers of `meet_air` that `store` put away."""
-    return row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9], row[10]
+        slope = numbers[n + SLOPE*size]
+        numbers[n + TOTAL*size] += weight*slope
+        numbers[n + TRIAL*size] = numbers[n + START*size] + ahead*slope
 
 
 @kernel
@@ -96,34 +75,15 @@ def normalise(x: Any) -> None:
 
 
 @kernel
-def rk4(stage: Any, numbers: Any, first: int, count: int, state: Any, current: Any, parameters: Any, shared: bool,
-        command: Any, dt: float) -> None:
-    """Advance `count` aircraft from row `first` by `dt`; gusts, ice and commands are held.
-
-    `stage` [TOGETHER, RECORDS]: the continuous state goes in and comes out in TRIAL; the rest is scratch.
-    `numbers` [TOGETHER, RECORDS*N_CONTINUOUS]: the same memory, as `numbers_of` gives it.
-    """
-    size, air = numbers.shape[1]//RECORDS, numbers[:, AIR*N_CONTINUOUS:]
-    for j in range(count):
-        put(numbers[j], START, TRIAL, size)
-        put(numbers[j], TOTAL, TRIAL, size)
+def rk4(stage: Any, numbers: Any, s: Any, c: Any, p: Any, u: Any, dt: float) -> None:
+    """Advance one aircraft by `dt`: its continuous state goes in and comes out in the record TRIAL of `stage`."""
+    size = len(numbers)//RECORDS
+    x = stage[TRIAL]
+    put(numbers, START, TRIAL, size)
+    put(numbers, TOTAL, TRIAL, size)
     for k in range(STAGES):
-        for j in range(count):
-            i, x = first + j, stage[j, TRIAL]
-            attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
-            store(air[j], meet_air(x, attitude, state[i], current[i], parameters[0 if shared else i]))
-        for j in range(count):
-            i, x = first + j, stage[j, TRIAL]
-            attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
-            rates(x, stage[j, SLOPE], attitude, recall(air[j]), state[i], current[i], parameters[0 if shared else i],
-                  command[i])
-        for j in range(count):
-            move(numbers[j], AHEAD[k]*dt, WEIGHT[k]*dt, size)
-    for j in range(count):
-        put(numbers[j], TRIAL, TOTAL, size)
-        normalise(stage[j, TRIAL])
-
-
-def numbers_of(stage: NDArray) -> NDArray:
-    """The memory of the scratch records of `rk4` as a row of float64 per aircraft."""
-    return stage.view(np.float64).reshape(len(stage), -1)
+        attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
+        rates(x, stage[SLOPE], attitude, meet_air(x, attitude, s, c, p), s, c, p, u)
+        move(numbers, AHEAD[k]*dt, WEIGHT[k]*dt, size)
+    put(numbers, TRIAL, TOTAL, size)
+    normalise(x)

@@ -16,7 +16,6 @@ import math
 from typing import Any
 
 from icing_env.atmosphere import pressure_altitude
-from icing_env.dynamics import forces
 from icing_env.frames import direction_cosines, euler_angles, to_local
 from icing_env.jit import kernel
 from icing_env.propulsion import torque
@@ -75,11 +74,10 @@ def advance_boom(s: Any, p: Any, drive: float) -> None:
 
 
 @kernel
-def start_instruments(x: Any, s: Any, c: Any, p: Any, dt: float) -> None:
-    """Settle every lag and filter on the present flight condition."""
+def start_instruments(x: Any, felt: tuple, s: Any, c: Any, p: Any, dt: float) -> None:
+    """Settle every lag and filter on the present flight condition; `felt`: of `dynamics.loads`."""
     hold_filter_constants(s, p, dt)
-    attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
-    fx, fy, fz, _l, _m, _n, airspeed, alpha, beta, _rho, _tl, _tr, _he, _ha, _ps = forces(x, attitude, s, c, p)
+    fx, fy, fz, _l, _m, _n, airspeed, alpha, beta, _rho, _tl, _tr, _he, _ha, _ps = felt
     s.pitot, s.vane_alpha, s.vane_beta = airspeed, alpha, beta
     s.boom_position, s.boom_rate = 0.0, 0.0
     s.filtered_alpha, s.filtered_beta = alpha, beta
@@ -175,15 +173,19 @@ def read_slow(s: Any, m: Any, p: Any) -> None:
 
 
 @kernel
-def read_instruments(x: Any, s: Any, m: Any, c: Any, p: Any, u: Any, o: Any, ten_hertz: Any, one_hertz: Any) -> None:
-    """One sample of every instrument that is due into `m`, and the true air data and load factor into `o`."""
-    attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
+def read_instruments(x: Any, felt: tuple, s: Any, m: Any, c: Any, p: Any, u: Any, o: Any, ten_hertz: Any,
+                     one_hertz: Any) -> None:
+    """One sample of every instrument that is due into `m`, and the true air data and load factor into `o`.
+
+    `felt`: of `dynamics.loads`.
+    """
     (fx, fy, fz, _l, _m, _n, airspeed, alpha, beta, _rho, thrust_left, thrust_right,
-     hinge_e, hinge_a, static) = forces(x, attitude, s, c, p)
+     hinge_e, hinge_a, static) = felt
     filter_flow_and_inertial(x, s, c, p, airspeed, alpha, beta, fx, fy, fz)
     read_fast(s, m, p)
     spare = read_attitude(x, s, m, p, u)
     if ten_hertz:
+        attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
         read_engines_and_navigation(x, attitude, s, m, p, thrust_left, thrust_right, hinge_e, hinge_a, static, spare)
     if one_hertz:
         read_slow(s, m, p)

@@ -8,6 +8,7 @@ flies bit for bit the same alone and in a batch, on one thread or several.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -16,17 +17,36 @@ from numpy.typing import NDArray
 
 from icing_env.accretion import advance_accretion
 from icing_env.atmosphere import GAS_CONSTANT, pressure, static_air
+from icing_env.blocks import (
+    AT_COMMAND,
+    AT_CURRENT,
+    AT_GUSTS,
+    AT_PARAMETERS,
+    GUSTS,
+    NOW,
+    ROWS,
+    copy_gusts,
+    feel_block,
+    fill,
+    recall_loads,
+    rk4_block,
+)
 from icing_env.cloud import advance_cloud
-from icing_env.dynamics import air_data, present_aircraft
+from icing_env.dynamics import air_data, forces, present_aircraft
 from icing_env.frames import direction_cosines
 from icing_env.ice_protection import advance_protection
-from icing_env.integrate import RECORDS, TOGETHER, TRIAL, copy, numbers_of, rk4
-from icing_env.jit import bound, entry, kernel
+from icing_env.integrate import RECORDS, TRIAL, copy, rk4
+from icing_env.jit import entry, kernel
+from icing_env.lanes import LANES, lane
+from icing_env.memory import call_at, matrix, rows
 from icing_env.parameters import PARAMETERS
 from icing_env.sensors import hold_filter_constants, read_instruments, start_instruments
 from icing_env.turbulence import advance_turbulence, start_turbulence
 from icing_env.types import COMMAND, CONTINUOUS, CURRENT, MEASUREMENT, OUTCOME, STATE
 
+CLOCK = np.dtype([("dt", "f8"), ("substeps", "i8"), ("ten_hertz", "i8"), ("one_hertz", "i8")])  # s, steps per sample
+NUMBER = np.dtype(np.float64)
+N_CURRENT, N_COMMAND, N_PARAMETERS = len(CURRENT.names or ()), len(COMMAND.names or ()), len(PARAMETERS.names or ())
 DUE = np.bool_(True)  # for a plain True numba would compile the instruments once more
 
 
@@ -50,51 +70,88 @@ def prepare(s: Any, c: Any, p: Any, u: Any, o: Any, dt: float, one_hertz: int) -
 
 
 @kernel
-def finish(x: Any, s: Any, m: Any, c: Any, p: Any, u: Any, o: Any, dt: float, ten_hertz: int, one_hertz: int) -> None:
-    """Clock and instruments at the end of the step."""
+def finish(felt: tuple, s: Any, m: Any, c: Any, p: Any, u: Any, o: Any, dt: float, ten_hertz: int,
+           one_hertz: int) -> None:
+    """Clock and instruments at the end of the step; `felt`: of `dynamics.loads`."""
     one = s.step % one_hertz == 0
     s.step += 1
     m.time = s.step*dt
-    read_instruments(x, s, m, c, p, u, o, s.step % ten_hertz == 0, one)
+    read_instruments(s, felt, s, m, c, p, u, o, s.step % ten_hertz == 0, one)
+
+
+@kernel
+def arrays_of(table: Any) -> tuple:
+    """The arrays that `Fleet` puts into the table of a slice, in its order."""
+    return (rows(table, 0, STATE), rows(table, 1, MEASUREMENT), rows(table, 2, CURRENT), rows(table, 3, PARAMETERS),
+            rows(table, 4, COMMAND), rows(table, 5, OUTCOME), rows(table, 6, CLOCK))
 
 
 @entry
-def advance(state: Any, stage: Any, numbers: Any, measurement: Any, current: Any, parameters: Any, command: Any,
-            outcome: Any, substeps: int, dt: float, ten_hertz: int, one_hertz: int) -> None:
-    """One environment step of every row; `parameters` has a row per aircraft or one for all."""
-    shared = len(parameters) == 1
-    for first in range(0, len(state), TOGETHER):
-        count = min(TOGETHER, len(state) - first)
-        for j in range(count):
-            i = first + j
-            prepare(state[i], current[i], parameters[0 if shared else i], command[i], outcome[i], dt, one_hertz)
-            copy(stage[j, TRIAL], state[i])
-        for _ in range(substeps):
-            rk4(stage, numbers, first, count, state, current, parameters, shared, command, dt/substeps)
-        for j in range(count):
-            i = first + j
-            copy(state[i], stage[j, TRIAL])
-            finish(stage[j, TRIAL], state[i], measurement[i], current[i], parameters[0 if shared else i], command[i],
-                   outcome[i], dt, ten_hertz, one_hertz)
+def advance(table: Any) -> None:
+    """One environment step of every row, one after another; there is a PARAMETERS row per aircraft or one for all."""
+    state, measurement, current, parameters, command, outcome, clocks = arrays_of(table)
+    stage, numbers = rows(table, 7, CONTINUOUS), rows(table, 8, NUMBER)
+    clock, shared = clocks[0], len(parameters) == 1
+    dt, step = clock.dt, clock.dt/clock.substeps
+    for i in range(len(state)):
+        s, c, p, u, x = state[i], current[i], parameters[0 if shared else i], command[i], stage[TRIAL]
+        prepare(s, c, p, u, outcome[i], dt, clock.one_hertz)
+        copy(x, s)
+        for _ in range(clock.substeps):
+            rk4(stage, numbers, s, c, p, u, step)
+        copy(s, x)
+        felt = forces(x, direction_cosines(x.e0, x.e1, x.e2, x.e3), s, c, p)
+        finish(felt, s, measurement[i], c, p, u, outcome[i], dt, clock.ten_hertz, clock.one_hertz)
 
 
 @entry
-def start(state: Any, stage: Any, measurement: Any, current: Any, parameters: Any, command: Any, outcome: Any,
-          dt: float) -> None:
+def advance_blocks(table: Any) -> None:
+    """`advance` in blocks of aircraft side by side."""
+    state, measurement, current, parameters, command, outcome, clocks = arrays_of(table)
+    block, currents = rows(table, 7, NUMBER), matrix(table, 2, N_CURRENT, NUMBER)
+    settings, commands = matrix(table, 3, N_PARAMETERS, NUMBER), matrix(table, 4, N_COMMAND, NUMBER)
+    clock, shared = clocks[0], len(parameters) == 1
+    dt, step = clock.dt, clock.dt/clock.substeps
+    for j in range(LANES if shared else 0):
+        fill(block, AT_PARAMETERS, j, settings[0])
+    for first in range(0, len(state), LANES):
+        count = min(LANES, len(state) - first)
+        for j in range(count):
+            i = first + j
+            prepare(state[i], current[i], parameters[0 if shared else i], command[i], outcome[i], dt,
+                    clock.one_hertz)
+            copy(lane(block, NOW, j, CONTINUOUS), state[i])
+            copy_gusts(lane(block, AT_GUSTS, j, GUSTS), state[i])
+            fill(block, AT_CURRENT, j, currents[i])
+            fill(block, AT_COMMAND, j, commands[i])
+            if not shared:
+                fill(block, AT_PARAMETERS, j, settings[i])
+        for _ in range(clock.substeps):
+            rk4_block(block, count, step)
+        feel_block(block, count)
+        for j in range(count):
+            i = first + j
+            copy(state[i], lane(block, NOW, j, CONTINUOUS))
+            finish(recall_loads(block, j), state[i], measurement[i], current[i], parameters[0 if shared else i],
+                   command[i], outcome[i], dt, clock.ten_hertz, clock.one_hertz)
+
+
+@entry
+def start(state: Any, measurement: Any, current: Any, parameters: Any, command: Any, outcome: Any, dt: float) -> None:
     """After the continuous state was set: settle gusts and instruments and take a first sample."""
     shared = len(parameters) == 1
     for i in range(len(state)):
         s, c, p = state[i], current[i], parameters[0 if shared else i]
-        x = stage[0, TRIAL]
-        copy(x, s)
         if s.temperature <= 0.0:  # not prescribed
             s.temperature = static_air(s.altitude)[0] + p.temperature_offset
         present_aircraft(s, p, c)
-        start_turbulence(s, p, air_data(x, direction_cosines(x.e0, x.e1, x.e2, x.e3), s, p)[0])
-        start_instruments(x, s, c, p, dt)
+        attitude = direction_cosines(s.e0, s.e1, s.e2, s.e3)
+        start_turbulence(s, p, air_data(s, attitude, s, p)[0])
+        felt = forces(s, attitude, s, c, p)
+        start_instruments(s, felt, s, c, p, dt)
         measurement[i].time = 0.0
         measurement[i].psi = 0.0
-        read_instruments(x, s, measurement[i], c, p, command[i], outcome[i], DUE, DUE)
+        read_instruments(s, felt, s, measurement[i], c, p, command[i], outcome[i], DUE, DUE)
 
 
 class Fleet:
@@ -115,7 +172,7 @@ class Fleet:
         if parameters.dtype != PARAMETERS or len(parameters) not in (1, n):
             raise ValueError(f"parameters must be a PARAMETERS array of 1 or {n} rows")
         self.parameters, self.n, self.dt, self.substeps = parameters, n, dt, substeps
-        self.clocks = max(1, round(0.1/dt)), max(1, round(1.0/dt))  # steps per sample at 10 Hz and 1 Hz
+        self.clock = np.array([(dt, substeps, max(1, round(0.1/dt)), max(1, round(1.0/dt)))], CLOCK)
         self.state = np.zeros(n, STATE)
         self.measurement = np.zeros(n, MEASUREMENT)
         self.current = np.zeros(n, CURRENT)
@@ -123,25 +180,31 @@ class Fleet:
         self.outcome = np.zeros(n, OUTCOME)
         bounds = np.linspace(0, n, min(threads, n) + 1).astype(int)
         self._slices = [slice(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
-        self._stages = [np.zeros((TOGETHER, RECORDS), CONTINUOUS) for _ in self._slices]
         self._pool = ThreadPoolExecutor(len(self._slices)) if len(self._slices) > 1 else None
-        self._bind()
+        self._calls: list[Callable[[], None]] = []
 
-    def _bind(self) -> None:
-        """Arguments of each slice, made once: building views costs more than the flight."""
-        shared = len(self.parameters) == 1
-        self._calls = [
-            bound(advance, self.state[k], stage, numbers_of(stage), self.measurement[k], self.current[k],
-             self.parameters if shared else self.parameters[k], self.command[k], self.outcome[k],
-                  self.substeps, self.dt, *self.clocks)
-            for k, stage in zip(self._slices, self._stages, strict=True)
-        ]
+    def bind(self) -> Callable[[], None]:
+        """Compile the step and write down its arguments: building views costs more than the flight.
+
+        Returns the step. Done at the first one if not before.
+        """
+        self._calls = [self._bound(k) for k in self._slices]
+        return self._calls[0] if self._pool is None else self.step
+
+    def _bound(self, k: slice) -> Callable[[], None]:
+        parameters = self.parameters if len(self.parameters) == 1 else self.parameters[k]
+        arrays = (self.state[k], self.measurement[k], self.current[k], parameters, self.command[k], self.outcome[k],
+                  self.clock)
+        if len(arrays[0]) >= LANES:
+            return call_at(advance_blocks, *arrays, np.zeros(ROWS*LANES))
+        stage = np.zeros(RECORDS, CONTINUOUS)
+        return call_at(advance, *arrays, stage, stage.view(np.float64))
 
     def start(self, rows: slice | NDArray = slice(None)) -> None:
         """Settle gusts, coefficients and instruments of the given rows on their continuous state."""
         state, measurement, current, outcome = (
             self.state[rows], self.measurement[rows], self.current[rows], self.outcome[rows])
-        start(state, self._stages[0], measurement, current,
+        start(state, measurement, current,
               self.parameters if len(self.parameters) == 1 else self.parameters[rows],
               self.command[rows], outcome, self.dt)
         if not isinstance(rows, slice):  # fancy indexing made copies
@@ -150,6 +213,8 @@ class Fleet:
 
     def step(self) -> None:
         """Advance every aircraft by one environment step under its command."""
+        if not self._calls:
+            self.bind()
         if self._pool is None:
             self._calls[0]()
         else:

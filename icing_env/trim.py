@@ -123,7 +123,8 @@ def eliminate(a: Any, b: Any) -> bool:
 @kernel
 def guess(z: Any, k: Any, p: Any) -> None:
     """Start of the search: cruise, banked for the turn."""
-    z[:] = 0.0
+    for j in range(UNKNOWNS):
+        z[j] = 0.0
     z[0], z[3] = 0.03, 0.03 + k.climb_angle
     z[2] = math.atan(k.airspeed*k.turn_rate/p.gravity_sea_level)
     z[7] = 0.5
@@ -134,11 +135,21 @@ def differentiate(z: Any, out: Any, jacobian: Any, trial: Any, moved: Any, x: An
                   u: Any, p: Any) -> None:
     """Jacobian of the residual `out` at the unknowns `z`, by forward differences; `trial`, `moved` are scratch."""
     for j in range(UNKNOWNS):
-        trial[:] = z
+        for m in range(UNKNOWNS):
+            trial[m] = z[m]
         trial[j] += DIFFERENCE
         residual(trial, moved, x, dx, s, c, k, u, p)
         for m in range(UNKNOWNS):
             jacobian[m, j] = (moved[m] - out[m])*(1.0/DIFFERENCE)
+
+
+@kernel
+def largest(values: Any) -> float:
+    """Largest magnitude; not a number if one of them is none. An array expression would take seconds to compile."""
+    found = 0.0
+    for j in range(UNKNOWNS):
+        found = abs(values[j]) if found == found and not abs(values[j]) <= found else found
+    return found
 
 
 @entry
@@ -160,14 +171,16 @@ def solve_rows(state: Any, current: Any, command: Any, condition: Any, parameter
         guess(z, k, p)
         for _ in range(ITERATIONS):
             residual(z, out, stage[0], stage[1], s, c, k, u, p)
-            left_over[i] = np.max(np.abs(out))
+            left_over[i] = largest(out)
             if left_over[i] < TOLERANCE:
                 break
             differentiate(z, out, jacobian, trial, moved, stage[0], stage[1], s, c, k, u, p)
             if not eliminate(jacobian, out):  # `out` becomes the step
                 left_over[i] = np.inf
                 break
-            z -= out*min(1.0, LARGEST_STEP/max(np.max(np.abs(out)), 1e-12))
+            share = min(1.0, LARGEST_STEP/max(largest(out), 1e-12))
+            for j in range(UNKNOWNS):
+                z[j] -= share*out[j]
         place(z, stage[0], s, k, u, p)
         command_of(stage[0], s, c, u, p)
         copy(s, stage[0])

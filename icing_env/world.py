@@ -12,37 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icing_env import actions, aircraft, effects
+from icing_env import scenario as scenarios
 from icing_env.accretion import glaze_of
+from icing_env.conclude import conclude, look
 from icing_env.errors import InputError
-from icing_env.jit import bound, entry
+from icing_env.jit import bound, compile_beside, compiles_beside
 from icing_env.loop import LoopFactory, NoLoop
 from icing_env.manoeuvres import excite, schedule
-from icing_env.observation import Axes, Observation, gather
+from icing_env.memory import call_at
+from icing_env.observation import Axes, Observation
 from icing_env.scenario import Range, Scenario
 from icing_env.simulate import Fleet
-from icing_env.tasks import TASK, TASKS, judge, measure_errors, refer, refer_rows
+from icing_env.tasks import TASK, TASKS, refer_rows
 from icing_env.trim import conditions, trim_rows
 from icing_env.types import COMMAND, SURFACES
-
-
-@entry
-def conclude(task: Any, target: Any, weights: Any, measurement: Any, state: Any, outcome: Any, current: Any,
-             command: Any, parameters: Any, seen: Any, tasks: Any, estimates: Any, advice: Any, layout: Any,
-             scaling: Any, out: Any) -> None:
-    """After a step, for every row: its count, references, errors, rewards, ending, observation."""
-    shared = len(parameters) == 1
-    for i in range(len(task)):
-        refer(task[i], target[i], measurement[i].time)
-        measure_errors(task[i], target[i], measurement[i])
-        judge(task[i], weights[0], state[i], outcome[i], current[i], command[i], parameters[0 if shared else i])
-        gather(i, seen, tasks, estimates, advice, layout, scaling, out)
-
-
-@entry
-def look(seen: Any, tasks: Any, estimates: Any, advice: Any, layout: Any, scaling: Any, out: Any) -> None:
-    """Observation of every row."""
-    for i in range(out.shape[0]):
-        gather(i, seen, tasks, estimates, advice, layout, scaling, out)
 
 
 class World:
@@ -65,7 +48,9 @@ class World:
         draws = scenario.randomise
         self.individual = bool(draws.parameters or draws.effects)
         parameters = aircraft.broadcast(self.true, n) if self.individual else self.true
+        compile_beside("icing_env.world")
         self.fleet = Fleet(parameters, n, dt, substeps, threads)
+        self._fly = self.fleet.step if compiles_beside() else self.fleet.bind()
         self.loop = loop(n, self.clean, dt)
         self.loop.attach(self.fleet.measurement, self.fleet.command)
         self.task, self.trimmed, self.weights = np.zeros(n, TASK), np.zeros(n, COMMAND), scenario.weights()
@@ -80,24 +65,22 @@ class World:
         self._bind(mode, axes)
 
     def _bind(self, mode: actions.Mode | None, axes: Axes) -> None:
-        f, loop = self.fleet, self.loop
-        views = [a.view(np.float64).reshape(self.n, -1)
-                 for a in (f.measurement, self.task, loop.estimate, loop.advisory)]
-        v = self.view
-        layout = (*views, v.layout, v.scaling, v.out)
-        self._conclude = bound(conclude, self.task, loop.target, self.weights, f.measurement, f.state, f.outcome,
-                               f.current, f.command, f.parameters, *layout)
-        self._look = bound(look, *layout)
+        f, loop, v = self.fleet, self.loop, self.view
+        seen = (f.measurement, self.task, loop.estimate, loop.advisory, v.layout, v.scaling, v.out)
+        self._conclude = call_at(conclude, *seen, loop.target, self.weights, f.state, f.outcome, f.current, f.command,
+                                 f.parameters)
+        self._look = call_at(look, *seen)
         self._excite = bound(excite, f.command, f.measurement, self.doublets) if len(self.doublets) else None
-        columns = actions.columns(mode, axes) if mode else None
+        columns = actions.columns(mode or "surfaces", axes)
         # what an action does at once, and what it does after the autopilot has flown the axes that it leaves open
         self._accept = self._overlay = None
         if mode == "targets":
-            self._accept = bound(actions.to_targets, self.action, columns, self.task, loop.target)
+            self._accept = call_at(actions.to_targets, self.action, columns, self.task, loop.target)
         elif mode == "surfaces":
-            act = bound(actions.to_surfaces, self.action, columns, self.trimmed, f.command)
-            self._accept, self._overlay = (act, None) if axes == "all" else (bound(actions.check, self.action), act)
-        self._fly, self._steer, self._protect, self._observe = f.step, loop.steer, loop.protect, loop.observe
+            act = call_at(actions.to_surfaces, self.action, columns, self.trimmed, f.command)
+            checked = call_at(actions.check, self.action, columns)
+            self._accept, self._overlay = (act, None) if axes == "all" else (checked, act)
+        self._steer, self._protect, self._observe = loop.steer, loop.protect, loop.observe
         self._steered = mode != "surfaces" or axes != "all"
 
     def reset(self, rows: NDArray | None = None, seeds: Sequence[int] | None = None,
@@ -210,7 +193,7 @@ class World:
         if self._accept is not None:
             self._take(action)
         if self.scheduled:
-            self._follow_schedule(np.flatnonzero(self.steps % self.fleet.clocks[1] == 0.0))
+            self._follow_schedule(np.flatnonzero(self.steps % self.fleet.clock["one_hertz"][0] == 0.0))
         if self._steered:
             self._steer()
         if self._overlay is not None:
@@ -297,3 +280,7 @@ class World:
 
 def _uniform(rng: np.random.Generator, span: Range) -> float:
     return float(rng.uniform(span.low, span.high))
+
+
+if __name__ == "__main__":  # see `icing_env.jit.compile_beside`
+    World(scenarios.load("clear_air"), mode="surfaces").reset(seeds=[0])

@@ -232,7 +232,7 @@ def provenance(flights: Sequence[Reconstruction], others: Sequence[Reconstructio
         "held_out": [{"sha256": content_hash(f.record), "samples": len(f.time), "notes": list(f.notes)}
                      for f in others],
         "references": references, "without": list(without), "library": len(effects.LIBRARY),
-        "sources": source_hash(), "seed": seed,
+        "sources": source_hash("sim2real"), "seed": seed,
         "assumptions": {"prior_no_gap": P_NONE, "prior_unknown": P_UNKNOWN, "baseline_spread": SPREAD},
     }
 

@@ -7,6 +7,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from icing_env.env import TwinOtterEnv
+from icing_env.jit import compile_beside
 from icing_env.loop import LoopFactory, NoLoop
 from icing_env.vector_env import TwinOtterVectorEnv
 from testbed.closed_loop import ClosedLoop
@@ -30,9 +31,15 @@ def _loop(options: dict[str, Any]) -> LoopFactory:
 
 def make(**options: Any) -> TwinOtterEnv:
     """One aircraft. Options: those of `TwinOtterEnv`, and observer, management, protection, boots (all True)."""
+    compile_beside("testbed.environments")
     return TwinOtterEnv(loop=_loop(options), **options)
 
 
 def make_vector(num_envs: int = 1, **options: Any) -> TwinOtterVectorEnv:
     """Many aircraft. Options: those of `TwinOtterVectorEnv`, and observer, management, protection, boots."""
+    compile_beside("testbed.environments")
     return TwinOtterVectorEnv(num_envs, loop=_loop(options), **options)
+
+
+if __name__ == "__main__":  # see `icing_env.jit.compile_beside`
+    make().reset(seed=0)

@@ -123,7 +123,7 @@ def air_data(x: Record, C: list[list[Any]], s: Record, p: Record) -> Record:
     plane = np.sqrt(ua**2 + wa**2)
     V = np.sqrt(plane**2 + va**2)
     Vf = np.maximum(V, 0.1524)
-    alpha, beta = np.arctan2(wa, ua), np.arcsin(clip(va / Vf, -1, 1))
+    alpha, beta = np.arctan2(wa, ua), np.arctan2(va, plane)
     sin_a, cos_a = wa / np.maximum(plane, 1e-9), ua / np.maximum(plane, 1e-9)
     phat, qhat, rhat = pa * p.span / (2 * Vf), qa * p.chord / (2 * Vf), ra * p.span / (2 * Vf)
     return Record(pressure=pressure, density=density, g=g, qbar=density * V**2 / 2, ua=ua, va=va, wa=wa, qa=qa, V=V,

@@ -168,11 +168,9 @@ def as_records(fleet: Fleet) -> None:
     """Let plain Python write x.u: numba knows fields as attributes, NumPy only in record arrays."""
     for name in ("state", "measurement", "current", "command", "outcome", "parameters"):
         setattr(fleet, name, getattr(fleet, name).view(np.recarray))
-    fleet._stages = [stage.view(np.recarray) for stage in fleet._stages]
-    fleet._bind()
 
 
-def numbers(rows: int = 2, seconds: float = 1.0) -> NDArray:
+def numbers(rows: int, seconds: float) -> NDArray:
     """State, measurement and coefficients after a short flight, as plain numbers."""
     p, s, u = world(range(rows))
     fleet = Fleet(p, rows)
@@ -185,11 +183,12 @@ def numbers(rows: int = 2, seconds: float = 1.0) -> NDArray:
     return np.concatenate([np.array(a[name], float) for a in arrays for name in a.dtype.names if name != "seed"])
 
 
-def test_plain_python_flies_the_same() -> None:
+@pytest.mark.parametrize(("rows", "seconds"), [(2, 1.0), (9, 0.1)], ids=["one after another", "side by side"])
+def test_plain_python_flies_the_same(rows: int, seconds: float) -> None:
     """Not to the bit: plain Python does not fuse a product and a sum where the processor can."""
-    code = "from test_equivalence import numbers; print(numbers().tobytes().hex())"
+    code = f"from test_equivalence import numbers; print(numbers({rows}, {seconds}).tobytes().hex())"
     plain = np.frombuffer(bytes.fromhex(subprocess_output(code, NUMBA_DISABLE_JIT="1")), float)
-    compiled = numbers()
+    compiled = numbers(rows, seconds)
     assert plain.shape == compiled.shape and np.isfinite(plain).all()
     np.testing.assert_allclose(plain, compiled, rtol=1e-12, atol=1e-12)
 
@@ -249,7 +248,7 @@ def test_a_changed_source_file_moves_the_cache(tmp_path: Path) -> None:
         "import icing_env; from icing_env import jit; from icing_env.linearise import flow;"
         "import numpy as np; from icing_env.types import CONTINUOUS, STATE; from icing_env.aircraft import load;"
         "s, x = np.zeros(1, STATE), np.zeros(1, CONTINUOUS); x['u'], x['e0'] = 50.0, 1.0;"
-        "print(icing_env.__file__, jit.source_hash(), flow(x, s, load())[0])"
+        "print(icing_env.__file__, jit.source_hash('icing_env'), flow(x, s, load())[0])"
     )
 
     def fly() -> tuple[str, str, float]:
