@@ -24,6 +24,8 @@ ITEMS: dict[str, tuple[str, str]] = {  # module of the item's `rows`, and what i
     "fig21_22": ("trim", "trim with and without ice"),
     "fig23_26": ("starts", "H-infinity from seven starts, clear air"),
     "fig27_30": ("natural_ice", "H-infinity in natural ice"),
+    "recorded_methods": ("recorded", "every method on the recorded flights against the textbook"),
+    "prediction": ("prediction", "a recorded flight predicted from another"),
     "textbook": ("textbook", "recorded flights of the same aircraft against the textbook"),
 }
 

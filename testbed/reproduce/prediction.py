@@ -1,0 +1,84 @@
+"""A recorded flight predicted from another: derivatives of the one, controls of the other, no aerodynamics refitted.
+
+Records 018 and 017 of NASA's Twin Otter, 13 February 2002. Only the datum of the predicted record (first state,
+constant coefficients, constant errors of instruments) is fitted to it.
+"""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from estimators.estimate import Estimate
+from estimators.methods import METHODS, method
+from icing_env.record import FlightRecord, read
+from testbed.flown_again import FlownAgain, fly_again
+from testbed.plot_style import ROLES, legend_above, line, scale_of, styled
+from testbed.reproduce.pictures import Picture
+from testbed.reproduce.row import Row
+from testbed.textbook import folder
+
+ITEM = "prediction"
+SOURCE, TARGET = "totter_demo_data.mat", "totter_pred_data.mat"
+CHANNELS = ("alpha", "q", "az")
+GOOD = 0.9  # share of variance from which a record counts as predicted (assumed)
+
+
+def rows(seed: int) -> list[Row]:
+    """Share of the variance of alpha, q and az that each method's derivatives explain in the record not used."""
+    del seed
+    pair = both()
+    if pair is None:
+        return []
+    found = []
+    for how in METHODS:
+        flown = predicted(method(how)(pair[0]), pair[1])
+        found += [_row(how, channel, flown) for channel in CHANNELS]
+    return found
+
+
+def both() -> tuple[FlightRecord, FlightRecord] | None:
+    """The record identified and the record predicted, where both are present."""
+    paths = [folder()/SOURCE, folder()/TARGET]
+    return (read(paths[0]), read(paths[1])) if all(path.is_file() for path in paths) else None
+
+
+def predicted(estimates: dict[str, Estimate], record: FlightRecord) -> FlownAgain:
+    """The longitudinal flight of a record by derivatives from elsewhere."""
+    return next(f for f in fly_again(record, estimates) if f.axis == "longitudinal")
+
+
+def _row(how: str, channel: str, flown: FlownAgain) -> Row:
+    share = flown.r2[channel]
+    return Row(ITEM, f"{channel} of record 017 from the derivatives of 018 ({how})", "recorded", "a good prediction",
+               share, "1", None, share >= GOOD, f"share of variance {GOOD:g} or more",
+               "flown freely through the recorded elevator, speed and attitude; datum fitted")
+
+
+def pictures(seed: int) -> list[Picture]:
+    """The predicted flight by stepwise regression's derivatives, over what was measured."""
+    del seed
+    pair = both()
+    if pair is None:
+        return []
+    figure = draw(predicted(method("stepwise")(pair[0]), pair[1]))
+    return [Picture(figure, "Prediction: record 017 flown with the derivatives that stepwise regression found in "
+                    "record 018. Dashed, measured.", "Predicted and measured histories lie on one another")]
+
+
+@styled
+def draw(flown: FlownAgain) -> Figure:
+    """Measured and simulated channels over time."""
+    names = [n for n in flown.measured if n in flown.simulated]
+    figure = Figure(figsize=(9.2, 0.7 + 1.35*len(names)), layout="constrained")
+    panels = list(figure.subplots(len(names), 1, sharex=True, squeeze=False).flat)
+    for axes, name in zip(panels, names, strict=True):
+        scale = scale_of(name)
+        line(axes, flown.time, flown.simulated[name]*scale.factor, **ROLES["estimate"], label="simulated")
+        line(axes, flown.time, flown.measured[name]*scale.factor, **ROLES["truth"], label="measured")
+        axes.set_ylabel(f"{scale.label}\n({scale.unit})")
+        axes.margins(x=0.0)
+        axes.annotate(f"R² {flown.r2[name]:.3f}", (0.99, 0.86), xycoords="axes fraction", ha="right")
+    panels[-1].set_xlabel("time (s)")
+    figure.align_ylabels()
+    legend_above(figure, panels)
+    return figure
