@@ -12,10 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers import autopilot, envelope_protection, ice_management
-from estimators import hinf
 from estimators.airframe import airframe_from
-from estimators.hinf import memory as hinf_memory
-from estimators.hinf import tuning as hinf_tuning
+from estimators.observer.choice import observer as observer_named
 from estimators.observer.layout import PARAMETER_NAMES
 from icing_env.jit import bound
 from icing_env.types import ESTIMATE, ESTIMATED_NAMES, TARGET
@@ -32,18 +30,20 @@ class ClosedLoop:
         management: find ice, move the limits, and operate ice protection where `boots` says so.
         protection: limit commands to the limits.
         boots: let the ice management switch boots and propeller heat.
+        estimator: which observer, by its name in `estimators.observer.choice`.
     """
 
     def __init__(self, n: int, clean: NDArray, dt: float, *, observer: bool = True, management: bool = True,
-                 protection: bool = True, boots: bool = True) -> None:
+                 protection: bool = True, boots: bool = True, estimator: str = "hinf") -> None:
         self.dt, self.clean = dt, clean[:1].copy()
         self.observing, self.managing, self.protecting, self.boots = observer, management, protection, boots
         self.airframe = airframe_from(self.clean)
-        self.tuning, self.gains = hinf_tuning.default_tuning(), autopilot.load_gains()
+        chosen = observer_named(estimator)
+        self._step, self.tuning, self.gains = chosen.step, chosen.default_tuning(), autopilot.load_gains()
         self.management_tuning, self.limits = ice_management.load_tuning(), envelope_protection.load_tuning()
         self.target = np.zeros(n, TARGET)
-        self._fresh_estimate = clean_estimate(self.airframe, self.tuning)
-        self._fresh_observer = hinf_memory.init(self.airframe, self.tuning, 1)
+        self._fresh_observer = chosen.init(self.airframe, self.tuning, 1)
+        self._fresh_estimate = clean_estimate(self._fresh_observer)
         self.observer, self.estimate = np.repeat(self._fresh_observer, n), np.repeat(self._fresh_estimate, n)
         self.advisory, self.autopilot = ice_management.init(n), autopilot.init(n)
 
@@ -51,7 +51,7 @@ class ClosedLoop:
         """Bind every part to the arrays it works on."""
         self.measurement = measurement
         estimate, advisory, dt = self.estimate, self.advisory, self.dt
-        self._estimate = bound(hinf.step, self.observer, estimate, measurement, self.airframe, self.tuning, dt)
+        self._estimate = bound(self._step, self.observer, estimate, measurement, self.airframe, self.tuning, dt)
         self._manage = bound(ice_management.step, advisory, estimate, measurement, self.clean, self.management_tuning,
                              dt)
         self._steer: Callable[[], None] | None = None  # compiled when first wanted: surfaces alone need no autopilot
@@ -97,13 +97,11 @@ class ClosedLoop:
                 "observer": self.observer, "autopilot": self.autopilot}
 
 
-def clean_estimate(airframe: NDArray, tuning: NDArray) -> NDArray:
-    """ESTIMATE row of an observer that has seen nothing yet: the clean aircraft, with the prior's standard errors."""
+def clean_estimate(memory: NDArray) -> NDArray:
+    """ESTIMATE row of an observer that has seen nothing yet, from its fresh memory: clean, and the prior."""
     estimate = np.zeros(1, ESTIMATE)
-    memory = hinf_memory.init(airframe, tuning, 1)
     for i, name in enumerate(PARAMETER_NAMES):
         if name in ESTIMATED_NAMES:
-            estimate[name] = memory["theta"][0, i]
-            estimate[f"{name}_std"] = memory["deviation"][0, i]
+            estimate[name], estimate[f"{name}_std"] = memory["theta"][0, i], memory["deviation"][0, i]
     estimate["health"] = 1.0
     return estimate

@@ -14,19 +14,21 @@ from testbed.closed_loop import ClosedLoop
 
 
 def loop_factory(observer: bool = True, management: bool = True, protection: bool = True,
-                 boots: bool = True) -> LoopFactory:
+                 boots: bool = True, estimator: str = "hinf") -> LoopFactory:
     """What closes the loop, by its parts; see `testbed.closed_loop.ClosedLoop`."""
 
     def make_loop(n: int, clean: NDArray, dt: float) -> ClosedLoop:
-        return ClosedLoop(n, clean, dt, observer=observer, management=management, protection=protection, boots=boots)
+        return ClosedLoop(n, clean, dt, observer=observer, management=management, protection=protection, boots=boots,
+                          estimator=estimator)
 
     return make_loop
 
 
 def _loop(options: dict[str, Any]) -> LoopFactory:
     parts = {name: options.pop(name, True) for name in ("observer", "management", "protection", "boots")}
+    estimator = options.pop("estimator", "hinf")
     bare = options.get("mode", "surfaces") == "surfaces" and options.get("axes", "all") == "all"
-    return NoLoop if bare and not any(parts.values()) else loop_factory(**parts)
+    return NoLoop if bare and not any(parts.values()) else loop_factory(**parts, estimator=estimator)
 
 
 def make(**options: Any) -> TwinOtterEnv:

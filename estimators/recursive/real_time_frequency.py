@@ -47,6 +47,8 @@ MEMORY = np.dtype([
     ("phase", "f8", (FREQUENCIES, 2)), ("turn", "f8", (FREQUENCIES, 2)),  # cosine and sine of w t, and of w dt
     ("length", "f8", (6,)),  # s, of what each channel's sums hold
     ("prior", "f8", (26,)),  # where the estimates started
+    ("leak", "f8", (6,)),  # the bias term as fitted over the band
+    ("square", "f8", (6,)),  # mean |residual|^2 over the band after the last fit
     ("clock", "f8"),  # s until the next estimate
     ("signal", "f8", (SIGNALS,)), ("keep", "f8", (SIGNALS,)),  # scratch
     ("a", "f8", (6, 6)), ("b", "f8", (6, 6)), ("score", "f8", (6,)), ("right", "f8", (6,)),  # scratch
@@ -76,6 +78,7 @@ def init(parameters: NDArray[np.void], tuning: NDArray[np.void], n: int, start: 
     memory = np.zeros(n, MEMORY)
     seat(memory, parameters, tuning, np.repeat(tuning["bandwidth"], 6), start)
     memory["prior"] = memory["theta"]
+    memory["leak"] = memory["theta"][:, list(FIRST)]
     return memory
 
 
@@ -128,11 +131,16 @@ def residual(ob: Any, c: int, k: int) -> tuple[float, float]:
 
 @block
 def invert(ob: Any, m: int) -> bool:
-    """ob["a"] (m, m) by its inverse, in place, Gauss-Jordan on a positive definite matrix. False if it is not."""
-    a = ob["a"]
+    """ob["a"] (m, m) by its inverse, in place, Gauss-Jordan on a positive definite matrix. False if it is not.
+
+    A pivot that elimination leaves less than 1e-10 of is the rounding of terms that cannot be told apart.
+    """
+    a, whole = ob["a"], ob["score"]
+    for k in range(m):
+        whole[k] = a[k, k]
     for k in range(m):
         pivot = a[k, k]
-        if not pivot > 0.0:
+        if not pivot > 1e-10 * whole[k]:
             return False
         a[k, k] = 1.0
         for j in range(m):
@@ -146,45 +154,70 @@ def invert(ob: Any, m: int) -> bool:
     return True
 
 
-@block
-def fit(ob: Any, tn: Any, c: int) -> bool:
-    """Estimates of one channel from its sums over the band. False if they cannot be told, even with the prior."""
-    first, m, a, b, score, right = FIRST[c], COUNT[c], ob["a"], ob["b"], ob["score"], ob["right"]
+@kernel
+def spectrum(ob: Any, c: int) -> float:
+    """Mean |residual|^2 of a channel over the band."""
     energy = 0.0
     for k in range(FREQUENCIES):
         re, im = residual(ob, c, k)
         energy += re * re + im * im
-    variance = energy / FREQUENCIES
+    return energy / FREQUENCIES
+
+
+@block
+def fit(ob: Any, tn: Any, c: int) -> bool:
+    """Estimates of one channel from its sums over the band. False if they cannot be told, even with the prior."""
+    first, m, a, right = FIRST[c], COUNT[c], ob["a"], ob["right"]
+    level, ob["theta"][first] = ob["theta"][first], ob["leak"][c]
+    if ob["square"][c] == 0.0:
+        ob["square"][c] = spectrum(ob, c)
     for i in range(m):
-        prior = variance * tn["q0"] / (ob["scale"][first + i] * ob["scale"][first + i])
+        prior = ob["square"][c] * tn["q0"] / (ob["scale"][first + i] * ob["scale"][first + i])
         right[i] = prior * (ob["prior"][first + i] - ob["theta"][first + i])
         for j in range(m):
-            a[i, j], b[i, j] = prior if i == j else 0.0, prior * variance if i == j else 0.0
-    spacing = (tn["highest"] - tn["lowest"]) / (FREQUENCIES - 1)
-    apart = max(1.0, 1.0 / (spacing * max(ob["length"][c], 1e-9)))
-    freedom = max(1.0, FREQUENCIES / apart - 0.5 * m)
-    inflation = FREQUENCIES / freedom  # apart times m/(m - p)
+            a[i, j] = prior if i == j else 0.0
     for k in range(FREQUENCIES):
         re, im = residual(ob, c, k)
         for i in range(m):
-            score[i] = ob["re"][k, first + i] * re + ob["im"][k, first + i] * im
-            right[i] += score[i]
-        for i in range(m):
+            right[i] += ob["re"][k, first + i] * re + ob["im"][k, first + i] * im
             for j in range(m):
                 a[i, j] += ob["re"][k, first + i] * ob["re"][k, first + j]
                 a[i, j] += ob["im"][k, first + i] * ob["im"][k, first + j]
-                b[i, j] += inflation * score[i] * score[j]
     if not invert(ob, m):
+        ob["theta"][first] = level
         return False
     for i in range(m):
         for j in range(m):
             ob["theta"][first + i] += a[i, j] * right[j]
+    ob["leak"][c], ob["square"][c] = ob["theta"][first], spectrum(ob, c)
+    scatter(ob, tn, c)
+    return True
+
+
+@block
+def scatter(ob: Any, tn: Any, c: int) -> None:
+    """Standard deviations of a channel's derivatives after `fit`, from the scores that its residuals leave."""
+    first, m, a, b, score = FIRST[c], COUNT[c], ob["a"], ob["b"], ob["score"]
+    spacing = (tn["highest"] - tn["lowest"]) / (FREQUENCIES - 1)
+    apart = max(1.0, 1.0 / (spacing * max(ob["length"][c], 1e-9)))
+    inflation = FREQUENCIES / max(1.0, FREQUENCIES / apart - 0.5 * m)  # apart times m/(m - p)
+    for i in range(m):
+        prior = ob["square"][c] * tn["q0"] / (ob["scale"][first + i] * ob["scale"][first + i])
+        for j in range(m):
+            b[i, j] = prior * ob["square"][c] if i == j else 0.0
+    for k in range(FREQUENCIES):
+        re, im = residual(ob, c, k)
+        for i in range(m):
+            score[i] = ob["re"][k, first + i] * re + ob["im"][k, first + i] * im
+        for i in range(m):
+            for j in range(m):
+                b[i, j] += inflation * score[i] * score[j]
+    for i in range(m):
         total = 0.0
         for j in range(m):
             for k in range(m):
                 total += a[i, j] * b[j, k] * a[i, k]
-        ob["deviation"][first + i] = math.sqrt(total)
-    return True
+        ob["deviation"][first + i] = math.sqrt(max(total, 0.0))
 
 
 @block
@@ -197,6 +230,9 @@ def level(ob: Any, tn: Any, c: int) -> None:
     if not abs(ob["zero"][first]) > 0.0:
         return
     rest = ob["zero"][26 + c]
+    if COUNT[c] == 1:
+        ob["leak"][c] = ob["theta"][first]
+    ob["theta"][first] = ob["leak"][c]
     for i in range(first + 1, first + COUNT[c]):
         rest -= ob["zero"][i] * ob["theta"][i]
     for k in range(LOW):
