@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from testbed.reproduce.flight import DEGREE, fly_all, hinf, stepwise
+from testbed.reproduce.flight_figures import over_sets
+from testbed.reproduce.pictures import Picture
 from testbed.reproduce.row import Row, Rule, row
 
 ITEM = "fig17_18"
@@ -41,3 +43,11 @@ def rows(seed: int) -> list[Row]:
             f"the paper sees it climb throughout; excess after the first cycle {drag[0]:.4f}, the last {drag[-1]:.4f}"),
     ]
     return found
+
+
+def pictures(seed: int) -> list[Picture]:
+    """Figures 17 and 18."""
+    flights = fly_all("three_minute_boots", seed, SEEDS)
+    return [over_sets(flights, ("baseline", *CYCLES), ("0", *(str(k + 1) for k in range(len(CYCLES)))),
+                      "Figures 17 and 18: CL_alpha and excess drag right after each of ten cycles of the boots, and "
+                      "before ice (0).")]

@@ -7,6 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from testbed.reproduce.flight import Flights, fly_all, stepwise
+from testbed.reproduce.flight_figures import over_sets
+from testbed.reproduce.pictures import Picture
 from testbed.reproduce.row import Row, Rule, row
 from testbed.reproduce.windows import Window
 
@@ -50,3 +52,11 @@ def _claim(quantity: str, paper: str, holds: bool, found: str, rule: str, miss: 
     """A statement of the paper that holds here or does not."""
     return Row(ITEM, quantity, "simulated", paper, paper if holds else "not so", "", None, bool(holds), rule,
                found if holds else f"{found}; {miss}")
+
+
+def pictures(seed: int) -> list[Picture]:
+    """Figures 15 and 16."""
+    flights = fly_all("selective_deicing", seed, SEEDS)
+    return [over_sets(flights, ("baseline", *SETS), ("clean", "iced", "wing", "tail", "vtail, struts"),
+                      "Figures 15 and 16: CL_alpha and excess drag before ice, with ice, and after each surface's "
+                      "de-icing in turn.")]

@@ -16,6 +16,7 @@ import numpy as np
 from icing_env import scenario as scenarios
 from icing_env.scenario import Scenario
 from testbed.reproduce.analyses import ANALYSES, PAPER
+from testbed.reproduce.pictures import Picture
 from testbed.reproduce.row import Row, Rule, row
 from testbed.reproduce.windows import Window, fly_sets
 
@@ -180,3 +181,10 @@ def wetter() -> Scenario:
     cloud = tuple(point.model_dump() | (FIRST_CLOUD if point.time >= THIRD and point.lwc > 0.0 else {})
                   for point in scenario.cloud)
     return scenarios.load("flight_010302f1", cloud=cloud)
+
+
+def pictures(seed: int) -> list[Picture]:
+    """Figures of this item."""
+    from testbed.reproduce import flight_figures  # it draws what this module flies
+
+    return flight_figures.founding(seed)

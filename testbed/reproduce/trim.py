@@ -6,6 +6,7 @@ import numpy as np
 
 from icing_env import aircraft
 from testbed.reproduce.flight import SEEDS, fly_all
+from testbed.reproduce.pictures import Picture
 from testbed.reproduce.row import Row, Rule, row
 from testbed.reproduce.windows import Window
 
@@ -40,3 +41,10 @@ def _thrust_coefficient(window: Window, area: float) -> float:
     trim = window.trim
     pressure = 0.5*window.truth["density"]*trim["airspeed"]**2
     return (trim["thrust_left"] + trim["thrust_right"])/(pressure*area)
+
+
+def pictures(seed: int) -> list[Picture]:
+    """Figures of this item."""
+    from testbed.reproduce import flight_figures  # it draws what this module flies
+
+    return flight_figures.trims(seed)
