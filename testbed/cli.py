@@ -24,6 +24,7 @@ VERBS = {
     "reproduce": "Put the founding paper's numbers beside ours.",
     "benchmark": "Measure how fast the testbed is.",
     "identify": "Estimate aerodynamic derivatives from flight records.",
+    "characterise": "Tell the ice on each surface, its onset, and whether protection works.",
     "diagnose": "Find the effect behind a gap between model and aircraft.",
 }
 PATH_ERRORS = (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError)
