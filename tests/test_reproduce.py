@@ -9,9 +9,16 @@ import numpy as np
 import pytest
 
 from icing_env.errors import InputError
+from testbed.reproduce import cases as reproduce_cases
 from testbed.reproduce import flight as reproduce_flight
+from testbed.reproduce import flight_figures as reproduce_figures
+from testbed.reproduce import page
+from testbed.reproduce import recorded as reproduce_recorded
+from testbed.reproduce import starts as reproduce_starts
 from testbed.reproduce import table1 as reproduce_table1
 from testbed.reproduce import textbook as reproduce_textbook
+from testbed.reproduce.analyses import ANALYSES
+from testbed.reproduce.compatible import calibrate
 from testbed.reproduce.items import ITEMS, reproduce
 from testbed.reproduce.row import Row, Rule, row
 from testbed.reproduce.windows import Window
@@ -128,3 +135,61 @@ def test_every_item_has_its_module_and_rows_are_plain():
     for module, what in ITEMS.values():
         assert callable(import_module(f"testbed.reproduce.{module}").rows) and what
     assert dataclasses.is_dataclass(Row) and reproduce_table1.ITEM == "table1"
+
+
+def test_in_still_air_the_scale_factor_of_alpha_is_found():
+    """A vane that reads a tenth too little; the same flight with gusts gives a scale that the vane does not have."""
+    window = reproduce_cases.fly_case("clear, high V", 0, 0.0, 1)[0]
+    right = calibrate(window.record)
+    low = dataclasses.replace(window.record, channels={**window.record.channels, "alpha": 0.9*window.record["alpha"]})
+    found = calibrate(low)
+    assert 1.0 + found.scale == pytest.approx(0.9*(1.0 + right.scale), rel=1e-3)
+    assert abs(right.scale) < 0.1 and 0.0 < right.std_error < 0.05
+    assert found.record["alpha"] == pytest.approx(right.record["alpha"], rel=1e-3)
+    assert calibrate(reproduce_cases.fly_case("clear, high V", 0, 1.0, 1)[0].record).scale < -0.2
+
+
+def test_unmatched_slopes_shrink_the_pitching_moment():
+    window = reproduce_cases.fly_case("clear, high V", 0, 0.0, 1)[0]
+    share = {points: {name: ANALYSES[f"unmatched over {points} points"](window)[name].estimate
+                      / window.stepwise[name].estimate for name in ("Cm_q", "Cm_elevator")} for points in (5, 11)}
+    assert 0.9 < share[5]["Cm_q"] < 1.0
+    assert share[11]["Cm_q"] < 0.9 and share[11]["Cm_elevator"] < 0.93
+
+
+def test_the_observer_forgets_where_it_started():
+    rows = [r for r in reproduce_starts.rows(0) if r.kind == "simulated"]
+    check(rows, "fig23_26")
+    assert len(rows) == 4 and all(r.agrees for r in rows)
+
+
+def test_started_at_regressions_values_the_observer_stays_near_them():
+    rows = reproduce(["fig27_30"])
+    check(rows, "fig27_30")
+    assert all(r.agrees for r in rows)
+
+
+def test_printed_results_of_the_recorded_flights_have_a_place_for_each_derivative():
+    for technique, files in reproduce_recorded.PRINTED.items():
+        for name, values in files.items():
+            assert len(values) == len(reproduce_recorded.NAMES[name]), (technique, name)
+            for key, value in reproduce_recorded.printed(technique, name).items():
+                book = reproduce_recorded.printed("equation error", name)[key]
+                assert abs(value) < 0.01 or value/book == pytest.approx(1.0, abs=0.45), (technique, key)
+
+
+def test_severity_starts_again_with_the_boots():
+    time = np.arange(0.0, 5850.0)
+    wing = 1e-4*np.minimum(time, 3000.0)
+    since = reproduce_figures.since_boots(time, wing)
+    assert since[1859] == wing[1859] and since[1870] == 0.0 < since[2500] < wing[2500]
+    assert since[3599] == pytest.approx(wing[3599] - wing[1870])
+
+
+def test_the_report_has_every_row(tmp_path):
+    rows = [row("fig27_30", f"quantity {k}", 1.0, value, "1", Rule(relative=0.1), "how it was found", miss="its reason")
+            for k, value in enumerate((1.0, 2.0))]
+    path = page.write(rows, 0, {"command": "icing reproduce"}, tmp_path / "new")
+    text = path.read_text()
+    assert "quantity 0" in text and "quantity 1" in text and "its reason" in text and "1 of 2 rows agree" in text
+    assert "Figures 27 to 30" in text and list(path.parent.iterdir()) == [path]
