@@ -25,7 +25,7 @@ from estimators.regression.equations import (
     movement,
 )
 from estimators.regression.preparation import prepare
-from estimators.regression.stepwise import PRACTICE, Criteria, Stepwise, stepwise
+from estimators.regression.stepwise import PRACTICE, Criteria, Stepwise, choose, stepwise
 from estimators.signals.coefficients import Airframe, airframe_of, thrust
 from estimators.signals.data_checks import check
 from estimators.signals.resample import Grid, common_grid
@@ -83,7 +83,7 @@ def identify(
         if compete:
             terms = competing(equation, data, rows) if problem.flown(equation) else {}
             data.update(terms)
-            model = _search(equation, data, terms, rows).terms if terms else ()
+            model = choose(*_candidates(equation, data, terms, rows))[0] if terms else ()
             entered = tuple(term for term in model if term in terms)
         found = fit_equation(equation, data, rows, dict(problem.moved), f"equation error, {mode}", entered)
         result.update(without_thrust(found, equation, problem.thrust_known))
@@ -108,21 +108,17 @@ def histories(
         rows = problem.rows[equation.target]
         terms = competing(equation, dict(problem.data), rows)
         if terms and problem.flown(equation):
-            found[equation.target] = _search(equation, {**problem.data, **terms}, terms, rows, criteria)
+            known = {**problem.data, **terms}
+            found[equation.target] = stepwise(*_candidates(equation, known, terms, rows), criteria)
     return found
 
 
-def _search(
-    equation: Equation,
-    data: Mapping[str, FloatArray],
-    terms: Mapping[str, FloatArray],
-    rows: NDArray[np.bool_],
-    criteria: Criteria = PRACTICE,
-) -> Stepwise:
-    """Stepwise regression on the good rows; the equation's own terms are forced unless optional."""
+def _candidates(
+    equation: Equation, data: Mapping[str, FloatArray], terms: Mapping[str, FloatArray], rows: NDArray[np.bool_]
+) -> tuple[dict[str, FloatArray], FloatArray, list[str]]:
+    """What competes on the good rows, the target, and what is forced: the equation's own terms unless optional."""
     forced = [name for name in equation.regressors if name not in equation.optional]
-    candidates = {name: data[name][rows] for name in (*equation.regressors, *terms)}
-    return stepwise(candidates, data[equation.target][rows], forced, criteria)
+    return {name: data[name][rows] for name in (*equation.regressors, *terms)}, data[equation.target][rows], forced
 
 
 def pose(record: FlightRecord, mode: str, default: Airframe | None = None, half: int | None = None) -> Problem:

@@ -82,11 +82,26 @@ def stepwise(
     forced: Sequence[str] = (),
     criteria: Criteria = PRACTICE,
 ) -> Stepwise:
+    """Choose terms as `choose` does and fit the model; arguments and errors as there."""
+    terms, history = choose(candidates, target, forced, criteria)
+    matrix = np.column_stack([*(candidates[name] for name in terms[:-1]), np.ones(len(target))])
+    return Stepwise(terms, least_squares(matrix, target), history)
+
+
+def choose(
+    candidates: Mapping[str, FloatArray],
+    target: FloatArray,
+    forced: Sequence[str] = (),
+    criteria: Criteria = PRACTICE,
+) -> tuple[tuple[str, ...], tuple[Step, ...]]:
     """Choose terms for `target` (N,) among `candidates` (each (N,)); a bias is always in the model.
 
     The candidate with the largest partial F enters if F > `f_in`, if it raises R2 by `r2_gain` and lowers the predicted
     square error; it is passed over if it is collinear with the model. Then every unforced term with F < `f_out` leaves.
     A term that has left does not return. The first candidate that fails ends the search and is told as refused.
+
+    Returns:
+        The terms in order, the bias last as "1", and how it came about.
 
     Raises:
         InputError: a forced term is no candidate.
@@ -96,7 +111,7 @@ def stepwise(
             raise InputError(f"stepwise: forced term '{name}' is no candidate; {nearest(name, list(candidates))}")
     search = _Search(candidates, target, criteria)
     model, waiting = list(forced), [name for name in candidates if name not in forced]
-    history = [search.step(name, "forced", search.partial_f(name, model), model) for name in forced]
+    history = [search.step(name, "forced", f, model) for name, f in search.partial_f(model).items()]
     while waiting:
         partial = search.entering(waiting, model)
         best = max(waiting, key=partial.__getitem__)
@@ -110,12 +125,11 @@ def stepwise(
         model.append(best)
         history[-1] = search.step(best, "entered", partial[best], model)
         for name in [n for n in model if n not in forced]:
-            f = search.partial_f(name, model)
+            f = search.partial_f(model)[name]
             if f < criteria.f_out:
                 model.remove(name)
                 history.append(search.step(name, "left", f, model, f"F below {criteria.f_out:g}"))
-    matrix = np.column_stack([*(candidates[name] for name in model), np.ones(len(target))])
-    return Stepwise((*model, "1"), least_squares(matrix, target), tuple(history))
+    return (*model, "1"), tuple(history)
 
 
 COLLINEAR = "collinear: "  # how the reason of a candidate begins that is passed over without ending the search
@@ -136,8 +150,11 @@ class _Search:
     def solve(self, model: list[str]) -> tuple[FloatArray, FloatArray, float]:
         """Standardised coefficients (p,), the inverse of the terms' correlation matrix (p, p), and 1 - R2."""
         rows = [self.index[name] for name in model]
-        inverse = np.linalg.pinv(self.correlation[np.ix_(rows, rows)], rcond=1e-12, hermitian=True)
-        with_target = self.correlation[rows, -1]
+        among, with_target = self.correlation[np.ix_(rows, rows)], self.correlation[rows, -1]
+        try:
+            inverse = np.linalg.inv(among)
+        except np.linalg.LinAlgError:  # a forced term repeats another: share what they explain
+            inverse = np.linalg.pinv(among, rcond=1e-12, hermitian=True)
         theta = inverse @ with_target
         return theta, inverse, max(float(self.correlation[-1, -1] - with_target @ theta), 1e-15)
 
@@ -145,11 +162,11 @@ class _Search:
         """Degrees of freedom left beside `terms` terms and the bias."""
         return max(self.count - terms - 1, 1)
 
-    def partial_f(self, name: str, model: list[str]) -> float:
-        """theta^2 / s^2(theta) of one term of the model, with white residuals as the F test has it."""
+    def partial_f(self, model: list[str]) -> dict[str, float]:
+        """theta^2 / s^2(theta) of each term of the model, with white residuals as the F test has it."""
         theta, inverse, left = self.solve(model)
-        i = model.index(name)
-        return float(theta[i] ** 2 / max(inverse[i, i] * left / self.freedom(len(model)), 1e-300))
+        f = theta**2 / np.maximum(np.diag(inverse) * left / self.freedom(len(model)), 1e-300)
+        return {name: float(x) for name, x in zip(model, f, strict=True)}
 
     def entering(self, waiting: list[str], model: list[str]) -> dict[str, float]:
         """Partial F that each waiting candidate would have in the model: one solution for all (Schur complement)."""
