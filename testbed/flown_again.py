@@ -68,7 +68,7 @@ def fly_again(record: FlightRecord, estimates: Mapping[str, Estimate], default: 
         moment = "Cm_alpha" if axis == "longitudinal" else "Cn_beta"
         if moment not in known or any(name not in grid.values for name in needed):
             continue
-        one = flown(grid, airframe, axis)
+        one = flown(grid, airframe, axis, smooth=False)
         plan = model(one, {**published(), **known})
         loose = tuple(i for i in plan.free if plan.names[i].startswith(DATUM) or plan.names[i] in CONSTANT)
         plan = replace(plan, free=loose)
