@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from estimators.compatibility.flow_angles import at_centre_of_gravity
 from estimators.compatibility.gusts import LENGTH, measure, whitening
 from estimators.compatibility.kinematics import COUNT, PARAMETERS, simulate
-from estimators.compatibility.record import check_compatibility, corrected
+from estimators.compatibility.record import check_compatibility, corrected, made_compatible
 from estimators.regression.equation_error import identify
 from icing_env import scenario as scenarios
 from icing_env.errors import InputError
@@ -137,6 +137,10 @@ def test_the_corrected_record_is_the_motion_and_says_what_was_taken_out() -> Non
         assert abs(np.mean(left)) < 0.25 * abs(np.mean(before)) + 0.1 * NOISE[name], name
         assert any(p.channel == name and "taken out" in p.kind and p.repaired for p in found.record.problems)
     np.testing.assert_array_equal(corrected(dirty)["alpha"], found.record["alpha"])
+    np.testing.assert_array_equal(made_compatible(dirty, "kinematic")["q"], found.record["q"])
+    assert made_compatible(dirty, "none") is dirty
+    with pytest.raises(InputError, match="valid are: none, kinematic, wind"):
+        made_compatible(dirty, "wnd")
     assert found.record.meta.corrected and not dirty.meta.corrected
 
 
@@ -181,6 +185,17 @@ def test_turbulence_lands_in_the_scale_factor_without_wind_states_and_not_with_t
     assert np.mean(np.abs(carried)) < 0.15 * np.mean(np.abs(rough))
     shown = np.isfinite(errors)
     assert (np.abs(carried[shown]) < 5 * errors[shown]).all()
+
+
+def test_what_no_instrument_can_be_wrong_by_is_told_and_not_taken_out() -> None:
+    record = gusty(2.0, 1)[0]
+    found = check_compatibility(record)
+    wild = [n for n, e in found.parameters.items() if n.startswith("scale") and not e.identifiable and e.estimate]
+    assert wild and all("more than an instrument" in found.parameters[n].why for n in wild)
+    for name in wild:
+        channel = name.removeprefix("scale_")
+        assert np.std(found.record[channel]) == pytest.approx(np.std(record[channel]), rel=1e-6)
+    assert identify(found.record)
 
 
 def test_the_gusts_themselves_are_measured() -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from estimators.compatibility.flow_angles import at_centre_of_gravity
 from estimators.compatibility.gusts import LENGTH, Whitening, measure
 from estimators.compatibility.kinematics import INPUTS, OUTPUTS, SCALED
-from estimators.compatibility.selection import ORDER, Filter, Found, Model, Readings, select
+from estimators.compatibility.selection import ORDER, PLAUSIBLE, Filter, Found, Model, Readings, select
 from estimators.estimate import Estimate
 from estimators.regression.equations import movement
 from estimators.signals.data_checks import check
@@ -29,6 +29,7 @@ LATERAL = ("beta", "p", "r", "phi", "ay")
 UNITS = {"airspeed": "m/s", "ax": "m/s2", "ay": "m/s2", "az": "m/s2", "p": "rad/s", "q": "rad/s", "r": "rad/s"}
 MOVED = np.radians(0.25)  # rms of a flow angle about its trend below which its scale is not asked for (assumed)
 SMOOTH = 0.3  # m/s: sigma of the gusts up to which flight tests call the air smooth (facts of MIL-F-8785C practice)
+KINDS = ("none", "kinematic", "wind")
 PASSES = 2  # of measuring the gusts and fitting again
 
 
@@ -38,7 +39,8 @@ class Compatibility:
 
     Attributes:
         parameters: bias_NAME (the channel's unit) and scale_NAME (1), with `reading = (1 + scale) truth + bias`;
-            `identifiable` is false for what was left out, which counts as zero.
+            `identifiable` is false for what was left out, which counts as zero, and for what came out larger than an
+            instrument can be wrong by, which is told but not taken out of the record.
         record: corrected for what was found, flow angles and accelerations at the centre of gravity.
         time: s (N,).
         residual: readings less the motion's, by channel (N,).
@@ -63,8 +65,14 @@ class Compatibility:
         return {name: e for name, e in self.parameters.items() if e.identifiable}
 
 
-def check_compatibility(record: FlightRecord, wind: bool = False) -> Compatibility:
+def check_compatibility(record: FlightRecord, wind: bool = False, largest_scale: float = 0.5) -> Compatibility:
     """Find the errors of the instruments in `record`, without or with gusts as states.
+
+    Args:
+        record: some tens of seconds; over minutes what the gyros' noise adds to the motion outgrows everything else.
+        wind: carry Dryden gusts as states.
+        largest_scale: largest scale factor that is believed and taken out of the record (assumed: a vane that reads
+            half or one and a half times the angle). A larger one reproduces analyses that took what they found.
 
     Raises:
         InputError: the record is refused by `data_checks.check`, lacks time, airspeed, alpha, q, theta, ax or az, or
@@ -87,12 +95,23 @@ def check_compatibility(record: FlightRecord, wind: bool = False) -> Compatibili
             model = Model(replace(readings, measured=_whole(readings, grid, values)), _filter(gusts))
             found = select(model, candidates, ruled, found.row)
             gusts = _gusts(readings, model.residual(found.row))
-    return _answer(record, grid, values, readings, found, gusts, wind, notes)
+    return _answer(record, grid, values, readings, found, gusts, wind, largest_scale, notes)
 
 
 def corrected(record: FlightRecord, wind: bool = False) -> FlightRecord:
     """The record without the errors that `check_compatibility` finds in it; errors as there."""
     return check_compatibility(record, wind).record
+
+
+def made_compatible(record: FlightRecord, kind: str) -> FlightRecord:
+    """The record as an analysis is to see it: as it is ("none"), or corrected, without or with wind states.
+
+    Raises:
+        InputError: `kind` is none of `KINDS`; or as `check_compatibility`.
+    """
+    if kind not in KINDS:
+        raise InputError(f"compatibility '{kind}' is unknown; valid are: {', '.join(KINDS)}")
+    return record if kind == "none" else corrected(record, kind == "wind")
 
 
 def _readings(grid: Grid, values: Mapping[str, FloatArray], record: FlightRecord) -> tuple[Readings, tuple[str, ...]]:
@@ -168,6 +187,7 @@ def _answer(
     found: Found,
     gusts: dict[int, tuple[Whitening, float]],
     wind: bool,
+    largest_scale: float,
     notes: tuple[str, ...],
 ) -> Compatibility:
     """Everything that is told."""
@@ -180,7 +200,8 @@ def _answer(
         sigma[axis] = abs(per) * noise * filtered.ratio
         if wind:
             air[axis] = per * filtered.gust(np.nan_to_num(residual[:, column]))
-    parameters = {name: _estimate(name, found, wind) for name in ORDER if name in found.names or name in found.dropped}
+    told = [name for name in ORDER if name in found.names or name in found.dropped]
+    parameters = {name: _estimate(name, found, wind, largest_scale) for name in told}
     if not wind and max(sigma.get(axis, 0.0) for axis in ("v", "w")) > SMOOTH:
         notes += (f"turbulence of sigma {max(sigma.values()):.1f} m/s lands in scale factors and biases: standard "
                   "errors do not hold; with wind states they do",)  # fmt: skip
@@ -191,12 +212,15 @@ def _answer(
     )  # fmt: skip
 
 
-def _estimate(name: str, found: Found, wind: bool) -> Estimate:
+def _estimate(name: str, found: Found, wind: bool, largest_scale: float) -> Estimate:
     method = "compatibility with wind states" if wind else "compatibility"
     unit = "1" if name.startswith("scale_") else UNITS.get(name.removeprefix("bias_"), "rad")
     if name in found.names:
         value, error = found.value(name)
-        return Estimate(value, error, unit, method)
+        why = ""
+        if abs(value) > (largest_scale if unit == "1" else PLAUSIBLE[name]):
+            why = f"{value:.2g} is more than an instrument can be wrong by: gusts, or another fault, stand in it"
+        return Estimate(value, error, unit, method, None, not why, why)
     return Estimate(0.0, float("nan"), unit, method, None, False, found.dropped[name])
 
 
@@ -208,8 +232,9 @@ def _corrected(
     for name in record.channels:
         if name not in values:
             continue
-        bias, scale = (parameters.get(f"{kind}_{name}") for kind in ("bias", "scale"))
-        offset, factor = bias.estimate if bias else 0.0, 1.0 + (scale.estimate if scale else 0.0)
+        wrong = [parameters.get(f"{kind}_{name}") for kind in ("bias", "scale")]
+        offset, share = (e.estimate if e is not None and e.identifiable else 0.0 for e in wrong)
+        factor = 1.0 + share
         fixed = (values[name] - offset) / factor
         channels[name] = np.where(grid.missing[name], np.nan, fixed) if name in grid.missing else fixed
         if offset or factor != 1.0:

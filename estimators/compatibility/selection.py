@@ -24,8 +24,9 @@ LARGEST_CORRELATION = 0.9
 SIGNIFICANT = 3.0  # an estimate over its standard error
 # From the one that is kept longest to the one that goes first, with the largest that is plausible (assumed).
 PLAUSIBLE = {
-    "bias_q": 0.02, "bias_p": 0.02, "bias_r": 0.02, "bias_az": 1.0, "bias_ay": 1.0, "bias_ax": 1.0,
-    "scale_alpha": 0.5, "scale_beta": 0.5, "bias_theta": 0.02, "bias_phi": 0.02, "bias_alpha": 0.02, "bias_beta": 0.02,
+    "bias_q": 0.02, "bias_p": 0.02, "bias_r": 0.02, "bias_az": 1.0, "bias_ay": 1.0, "bias_ax": 1.0,  # rad/s, m/s2
+    "scale_alpha": 0.5, "scale_beta": 0.5,
+    "bias_theta": 0.02, "bias_phi": 0.02, "bias_alpha": 0.02, "bias_beta": 0.02,  # rad
 }  # fmt: skip
 ORDER = tuple(PLAUSIBLE)
 ROUNDS = 4
