@@ -85,7 +85,9 @@ def identify(
             data.update(terms)
             model = choose(*_candidates(equation, data, terms, rows))[0] if terms else ()
             entered = tuple(term for term in model if term in terms)
-        found = fit_equation(equation, data, rows, dict(problem.moved), f"equation error, {mode}", entered)
+        found = fit_equation(
+            equation, data, rows, dict(problem.moved), f"equation error, {mode}", entered, mode == "textbook"
+        )
         result.update(without_thrust(found, equation, problem.thrust_known))
     return result
 

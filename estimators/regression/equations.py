@@ -95,6 +95,7 @@ def fit_equation(
     moved: Mapping[str, float],
     method: str,
     entered: tuple[str, ...] = (),
+    all_lags: bool = False,
 ) -> dict[str, Estimate]:
     """Fit one equation on the good rows and judge each of its derivatives.
 
@@ -105,16 +106,17 @@ def fit_equation(
         moved: rms of each surface, rad.
         method: name that the estimates carry.
         entered: nonlinear terms in the model beside the equation's own.
+        all_lags: correct errors for coloured residuals as the textbook does (`least_squares`).
     """
     regressors = (*equation.regressors, *entered)
-    full = _fit(equation.target, regressors, data, good)
+    full = _fit(equation.target, regressors, data, good, all_lags)
     known = {name: data[name][good] for name in regressors}
     judged = judge_terms(equation, regressors, full, known, moved, method)
     unseen = [n for n in equation.optional if not judged[name_of(equation.target, n)].identifiable]
     if not unseen:
         return judged
     kept = tuple(name for name in regressors if name not in unseen)
-    fit = _fit(equation.target, kept, data, good)
+    fit = _fit(equation.target, kept, data, good, all_lags)
     result = judge_terms(equation, kept, fit, {name: known[name] for name in kept}, moved, method)
     return {**result, **{name: judged[name] for name in (name_of(equation.target, n) for n in unseen)}}
 
@@ -153,10 +155,12 @@ def judge_terms(
     return {**result, f"{equation.target}_0": bias}
 
 
-def _fit(target: str, names: tuple[str, ...], data: dict[str, FloatArray], good: NDArray[np.bool_]) -> Fit:
+def _fit(
+    target: str, names: tuple[str, ...], data: dict[str, FloatArray], good: NDArray[np.bool_], all_lags: bool
+) -> Fit:
     matrix = np.column_stack([*(data[name] for name in names), np.ones(len(good))])
     matrix[~good] = 0.0
-    return least_squares(matrix, np.where(good, data[target], 0.0))
+    return least_squares(matrix, np.where(good, data[target], 0.0), fade=not all_lags)
 
 
 def _why_axis(equation: Equation, moved: Mapping[str, float]) -> str:

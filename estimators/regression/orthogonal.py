@@ -74,7 +74,7 @@ class Expansion:
 
 
 def expand(
-    functions: Mapping[str, FloatArray], target: FloatArray, bound: str = "total", weight: float = 1.0
+    functions: Mapping[str, FloatArray], target: FloatArray, bound: str = "noise", weight: float = 1.0
 ) -> Expansion:
     """Model `target` (N,) by `functions` (each (N,)) and a bias, in the order in which they are made orthogonal.
 
@@ -117,7 +117,7 @@ def expand(
     terms = [name for name, stay in zip(names, stays, strict=True) if stay]
     bias = float(np.mean(target) - sum(t * np.mean(functions[m]) for t, m in zip(theta[stays], terms, strict=True)))
     matrix = np.column_stack([*(functions[name] for name in terms), np.ones(n)])
-    return Expansion((*terms, "1"), np.append(theta[stays], bias), least_squares(matrix, target), ranking)
+    return Expansion((*terms, "1"), np.append(theta[stays], bias), least_squares(matrix, target, fade=True), ranking)
 
 
 def _orthogonal(functions: Mapping[str, FloatArray], names: list[str]) -> tuple[FloatArray, FloatArray, list[str]]:
@@ -148,7 +148,7 @@ def _orthogonal(functions: Mapping[str, FloatArray], names: list[str]) -> tuple[
 
 
 def identify(
-    record: FlightRecord, mode: str = "matched", default: Airframe | None = None, bound: str = "total"
+    record: FlightRecord, mode: str = "matched", default: Airframe | None = None, bound: str = "noise"
 ) -> dict[str, Estimate]:
     """Derivatives by name, as `equation_error.identify` gives them; its arguments and errors, and `bound` of `expand`.
 
@@ -163,7 +163,7 @@ def identify(
 
 
 def rankings(
-    record: FlightRecord, mode: str = "matched", default: Airframe | None = None, bound: str = "total"
+    record: FlightRecord, mode: str = "matched", default: Airframe | None = None, bound: str = "noise"
 ) -> dict[str, Expansion]:
     """The model of each coefficient of an axis that was flown; `.table()` prints how its functions ranked."""
     problem = pose(record, mode, default)
