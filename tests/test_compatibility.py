@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -263,3 +264,13 @@ def test_recorded_flights_are_nearly_compatible_and_their_derivatives_move_littl
     before, after = identify(record), identify(found.record)
     for key in ("Cm_elevator", "Cm_q") if "demo" in name else ("Cl_p", "Cn_rudder"):
         assert after[key].estimate == pytest.approx(before[key].estimate, rel=0.05), key
+
+
+def test_a_corrected_record_is_not_moved_to_the_centre_of_gravity_twice() -> None:
+    place = {"position": [4.0, 0.0, 0.0], "corrected": False}
+    record = flown(5)
+    far = replace(record, meta=replace(META, sensors={"alpha": place, "source of airspeed": "boom"}))
+    once = check_compatibility(far).record
+    assert once.meta.sensors["alpha"]["corrected"] and once.meta.sensors["source of airspeed"] == "boom"
+    moved = check_compatibility(once).record["alpha"] - once["alpha"]
+    assert np.std(moved) < 0.2 * np.std(4.0 * record["q"] / record["airspeed"]) + 1e-6

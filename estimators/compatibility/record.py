@@ -14,21 +14,18 @@ import numpy as np
 
 from estimators.compatibility.flow_angles import at_centre_of_gravity
 from estimators.compatibility.gusts import LENGTH, Whitening, measure
-from estimators.compatibility.kinematics import INPUTS, OUTPUTS, SCALED
-from estimators.compatibility.selection import ORDER, PLAUSIBLE, Filter, Found, Model, Readings, select
+from estimators.compatibility.kinematics import OUTPUTS, SCALED
+from estimators.compatibility.model import ORDER, PLAUSIBLE, Filter, Model, Readings
+from estimators.compatibility.readings import NEEDED, candidates_of, readings_of, without_blanks
+from estimators.compatibility.selection import Found, select
 from estimators.estimate import Estimate
-from estimators.regression.equations import movement
 from estimators.signals.data_checks import check
-from estimators.signals.fourier_smoothing import fourier_smooth
 from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import DataProblem, FlightRecord, FloatArray
 
-NEEDED = ("airspeed", "alpha", "q", "theta", "ax", "az")
-LATERAL = ("beta", "p", "r", "phi", "ay")
 UNITS = {"airspeed": "m/s", "ax": "m/s2", "ay": "m/s2", "az": "m/s2", "p": "rad/s", "q": "rad/s", "r": "rad/s"}
-MOVED = np.radians(0.25)  # rms of a flow angle about its trend below which its scale is not asked for (assumed)
-SMOOTH = 0.3  # m/s: sigma of the gusts up to which flight tests call the air smooth (facts of MIL-F-8785C practice)
+SMOOTH = 0.3  # m/s: sigma of the gusts up to which flight tests call the air smooth (assumed)
 KINDS = ("none", "kinematic", "wind")
 PASSES = 2  # of measuring the gusts and fitting again
 
@@ -85,14 +82,14 @@ def check_compatibility(record: FlightRecord, wind: bool = False, largest_scale:
         raise InputError(f"record '{record.meta.name}' lacks {', '.join(lacking)}: compatibility needs "
                          f"{', '.join(NEEDED)}")  # fmt: skip
     values, notes = at_centre_of_gravity(grid.values, record.meta.sensors, grid.dt)
-    readings, channels = _readings(grid, values, record)
-    candidates, ruled = _candidates(grid, values, channels)
+    readings, channels = readings_of(grid, values, record)
+    candidates, ruled = candidates_of(grid, values, channels)
     model = Model(readings, lambda y: y)
     found = select(model, candidates, ruled)
     gusts = _gusts(readings, model.residual(found.row))
     if wind:
         for _ in range(PASSES):
-            model = Model(replace(readings, measured=_whole(readings, grid, values)), _filter(gusts))
+            model = Model(replace(readings, measured=without_blanks(readings, values)), _filter(gusts))
             found = select(model, candidates, ruled, found.row)
             gusts = _gusts(readings, model.residual(found.row))
     return _answer(record, grid, values, readings, found, gusts, wind, largest_scale, notes)
@@ -112,47 +109,6 @@ def made_compatible(record: FlightRecord, kind: str) -> FlightRecord:
     if kind not in KINDS:
         raise InputError(f"compatibility '{kind}' is unknown; valid are: {', '.join(KINDS)}")
     return record if kind == "none" else corrected(record, kind == "wind")
-
-
-def _readings(grid: Grid, values: Mapping[str, FloatArray], record: FlightRecord) -> tuple[Readings, tuple[str, ...]]:
-    """Inputs and outputs; lateral channels are used together or not at all, and are zero where not used."""
-    lateral = all(name in values for name in LATERAL)
-    names = [n for n in OUTPUTS if n in values and (lateral or n in NEEDED)]
-    zero = np.zeros(len(grid.time))
-    inputs = np.column_stack([values[n] if n in values and (lateral or n in NEEDED) else zero for n in INPUTS])
-    known = {n: values[n] if n != "psi" else np.unwrap(values[n]) for n in names}
-    blank = {n: ~grid.good((n,)) for n in names}
-    if grid.time is record.time:
-        blank |= {n: ~np.isfinite(record[n]) for n in names}
-    measured = np.column_stack([np.where(blank[n], np.nan, known[n]) for n in names])
-    reach = min(len(grid.time), max(3, round(0.2 / grid.dt)))
-    start = np.array([float(np.median(known[n][:reach])) for n in names])
-    noise = np.array([fourier_smooth(x, grid.dt).noise for x in inputs.T])
-    return Readings(inputs, measured, tuple(OUTPUTS.index(n) for n in names), grid.dt, start, noise), tuple(names)
-
-
-def _whole(readings: Readings, grid: Grid, values: Mapping[str, FloatArray]) -> FloatArray:
-    """Outputs without blanks, which a recursive filter cannot pass: interpolated."""
-    columns = [values[OUTPUTS[i]] if OUTPUTS[i] != "psi" else np.unwrap(values["psi"]) for i in readings.channels]
-    return np.column_stack(columns)
-
-
-def _candidates(
-    grid: Grid, values: Mapping[str, FloatArray], channels: tuple[str, ...]
-) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Errors that may be asked for, and why not some others: scales of angles that did not move."""
-    inputs = [n for n in INPUTS if n in values and (n in NEEDED or "beta" in channels)]
-    wanted = {f"bias_{n}" for n in (*inputs, *channels)} | {f"scale_{n}" for n in SCALED if n in channels}
-    ruled = {}
-    for name in ("alpha", "beta"):
-        if name not in channels:
-            continue
-        moved = movement(grid.time, values[name], grid.good((name,)))
-        if moved < MOVED:
-            ruled[f"scale_{name}"] = (
-                f"{name} moved {np.degrees(moved):.2f} deg rms, at least {np.degrees(MOVED):.2f} is needed"
-            )
-    return tuple(name for name in ORDER if name in wanted and name not in ruled), ruled
 
 
 def _gusts(readings: Readings, residual: FloatArray) -> dict[int, tuple[Whitening, float]]:
@@ -234,16 +190,14 @@ def _corrected(
             continue
         wrong = [parameters.get(f"{kind}_{name}") for kind in ("bias", "scale")]
         offset, share = (e.estimate if e is not None and e.identifiable else 0.0 for e in wrong)
-        factor = 1.0 + share
-        fixed = (values[name] - offset) / factor
+        fixed = (values[name] - offset) / (1.0 + share)
         channels[name] = np.where(grid.missing[name], np.nan, fixed) if name in grid.missing else fixed
-        if offset or factor != 1.0:
-            told = ", ".join(
-                text
-                for text, there in ((f"bias {offset:.3g}", offset), (f"scale {factor - 1:+.3f}", factor != 1.0))
-                if there
+        if offset or share:
+            told = [f"bias {offset:.3g}"] * bool(offset) + [f"scale {share:+.3f}"] * bool(share)
+            problems.append(
+                DataProblem(name, f"{', '.join(told)} taken out", float(grid.time[0]), float(grid.time[-1]), True)
             )
-            problems.append(DataProblem(name, f"{told} taken out", float(grid.time[0]), float(grid.time[-1]), True))
     owner = {name: grid.values[name] for name in record.owner if name in grid.values}
-    fixed_record = replace(record, channels=channels, owner=owner, meta=replace(record.meta, corrected=True))
-    return fixed_record.with_problems(problems)
+    places = {n: {**e, "corrected": True} if isinstance(e, Mapping) else e for n, e in record.meta.sensors.items()}
+    meta = replace(record.meta, corrected=True, sensors=places)
+    return replace(record, channels=channels, owner=owner, meta=meta).with_problems(problems)
