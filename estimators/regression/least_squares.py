@@ -57,9 +57,7 @@ def least_squares(regressors: FloatArray, target: FloatArray, lags: int | None =
     middle = regressors.T @ _coloured(regressors, residual, used, lags, fade)
     coloured = information_inverse @ (0.5 * (middle + middle.T)) @ information_inverse
     if fade:
-        floor, found = variance * np.diag(information_inverse), np.diag(coloured)
-        lift = np.sqrt(np.maximum(floor / np.maximum(found, 1e-300), 1.0))
-        coloured = coloured * np.outer(lift, lift)
+        coloured = _lifted(coloured, variance * np.diag(information_inverse))
     return Fit(
         theta=theta,
         covariance=coloured,
@@ -69,6 +67,12 @@ def least_squares(regressors: FloatArray, target: FloatArray, lags: int | None =
         r2=1.0 - float(residual @ residual) / total if total > 0.0 else 0.0,
         full_rank=full_rank,
     )
+
+
+def _lifted(covariance: FloatArray, floor: FloatArray) -> FloatArray:
+    """Covariance (p, p) with no variance below `floor` (p,), correlations kept."""
+    lift = np.sqrt(np.maximum(floor / np.maximum(np.diag(covariance), 1e-300), 1.0))
+    return np.asarray(covariance * np.outer(lift, lift), dtype=np.float64)
 
 
 def _coloured(regressors: FloatArray, residual: FloatArray, used: int, lags: int | None, fade: bool) -> FloatArray:

@@ -110,13 +110,25 @@ def expand(
         Function(names[j], float(gain[j] / total) if total else 0.0, pse[r + 1], bool(kept[j]))
         for r, j in enumerate(order)
     )
-    theta = back @ np.where(kept, a, 0.0)
-    response = float(np.sqrt(np.mean((p @ np.where(kept, a, 0.0)) ** 2)))
-    spread = np.array([np.std(functions[name]) for name in names])
+    share = np.where(kept, a, 0.0)
+    response = float(np.sqrt(np.mean((p @ share) ** 2)))
+    return _ordinary({name: functions[name] for name in names}, target, back @ share, response, ranking)
+
+
+def _ordinary(
+    functions: Mapping[str, FloatArray],
+    target: FloatArray,
+    theta: FloatArray,
+    response: float,
+    ranking: tuple[Function, ...],
+) -> Expansion:
+    """The model in ordinary functions, without those that add next to nothing to the rms `response`."""
+    spread = np.array([np.std(values) for values in functions.values()])
     stays = np.abs(theta) * spread > SMALL * response
-    terms = [name for name, stay in zip(names, stays, strict=True) if stay]
-    bias = float(np.mean(target) - sum(t * np.mean(functions[m]) for t, m in zip(theta[stays], terms, strict=True)))
-    matrix = np.column_stack([*(functions[name] for name in terms), np.ones(n)])
+    terms = [name for name, stay in zip(functions, stays, strict=True) if stay]
+    means = np.array([np.mean(functions[name]) for name in terms])
+    bias = float(np.mean(target) - theta[stays] @ means)
+    matrix = np.column_stack([*(functions[name] for name in terms), np.ones(len(target))])
     return Expansion((*terms, "1"), np.append(theta[stays], bias), least_squares(matrix, target, fade=True), ranking)
 
 

@@ -109,7 +109,7 @@ def choose(
     for name in forced:
         if name not in candidates:
             raise InputError(f"stepwise: forced term '{name}' is no candidate; {nearest(name, list(candidates))}")
-    search = _Search(candidates, target, criteria)
+    search = Search(candidates, target, criteria)
     model, waiting = list(forced), [name for name in candidates if name not in forced]
     history = [search.step(name, "forced", f, model) for name, f in search.partial_f(model).items()]
     while waiting:
@@ -135,7 +135,7 @@ def choose(
 COLLINEAR = "collinear: "  # how the reason of a candidate begins that is passed over without ending the search
 
 
-class _Search:
+class Search:
     """Fits of one target by subsets of the candidates, from the correlation matrix of all of them."""
 
     def __init__(self, candidates: Mapping[str, FloatArray], target: FloatArray, criteria: Criteria) -> None:
