@@ -8,21 +8,28 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from icing_env.dynamics import loads, meet_air, meet_air_near, rates
 from icing_env.frames import direction_cosines
 from icing_env.integrate import AHEAD, RECORDS, SLOPE, STAGES, START, TOTAL, TRIAL, WEIGHT, move, normalise, put
+from icing_env.jit import block as apart
 from icing_env.jit import kernel
 from icing_env.lanes import LANES, lane
 from icing_env.parameters import PARAMETERS
 from icing_env.types import COMMAND, CONTINUOUS, CURRENT, GUST_FIELDS, N_CONTINUOUS, structured
 
 GUSTS = structured(GUST_FIELDS[:7])
-N_AIR, N_LOADS = 11, 15  # numbers that `meet_air` and `loads` return
+AIR = np.dtype([(name, "f8") for name in (  # what `meet_air` returns
+    "density", "static", "airspeed", "alpha", "beta", "sine", "cosine", "ua", "va", "wa", "slowness")])
+LOADS = np.dtype([(name, "f8") for name in (  # what `loads` returns
+    "fx", "fy", "fz", "roll", "pitch", "yaw", "airspeed", "alpha", "beta", "density", "thrust_left", "thrust_right",
+    "hinge_elevator", "hinge_aileron", "static")])
 # Rows of a block: the records of `integrate`, the air met, the loads felt, and what is held over the step.
 NOW, RATES = TRIAL*N_CONTINUOUS, SLOPE*N_CONTINUOUS
-AIR = RECORDS*N_CONTINUOUS
-LOADS = AIR + N_AIR
-FAILS = LOADS + N_LOADS  # not 0: `meet_air_near` does not hold
+AT_AIR = RECORDS*N_CONTINUOUS
+AT_LOADS = AT_AIR + len(AIR.names or ())
+FAILS = AT_LOADS + len(LOADS.names or ())  # not 0: `meet_air_near` does not hold
 AT_GUSTS = FAILS + 1
 AT_CURRENT = AT_GUSTS + len(GUSTS.names or ())
 AT_COMMAND = AT_CURRENT + len(CURRENT.names or ())
@@ -45,45 +52,61 @@ def copy_gusts(out: Any, s: Any) -> None:
 
 
 @kernel
-def store(block: Any, row: int, j: int, values: tuple) -> None:
-    """Put what a kernel returned for aircraft `j` into a block from a row on."""
-    for n in range(len(values)):
-        block[(row + n)*LANES + j] = values[n]
+def store_air(block: Any, j: int, air: tuple) -> None:
+    """Put what `meet_air` returned for aircraft `j` into a block."""
+    a = lane(block, AT_AIR, j, AIR)
+    (a.density, a.static, a.airspeed, a.alpha, a.beta, a.sine, a.cosine, a.ua, a.va, a.wa, a.slowness) = air
 
 
 @kernel
 def recall_air(block: Any, j: int) -> tuple:
-    """The numbers of `meet_air` of one aircraft."""
-    a = AIR*LANES + j
-    return (block[a], block[a + LANES], block[a + 2*LANES], block[a + 3*LANES], block[a + 4*LANES],
-            block[a + 5*LANES], block[a + 6*LANES], block[a + 7*LANES], block[a + 8*LANES], block[a + 9*LANES],
-            block[a + 10*LANES])
+    """What `store_air` put away."""
+    a = lane(block, AT_AIR, j, AIR)
+    return a.density, a.static, a.airspeed, a.alpha, a.beta, a.sine, a.cosine, a.ua, a.va, a.wa, a.slowness
+
+
+@kernel
+def store_loads(block: Any, j: int, felt: tuple) -> None:
+    """Put what `loads` returned for aircraft `j` into a block."""
+    f = lane(block, AT_LOADS, j, LOADS)
+    (f.fx, f.fy, f.fz, f.roll, f.pitch, f.yaw, f.airspeed, f.alpha, f.beta, f.density, f.thrust_left, f.thrust_right,
+     f.hinge_elevator, f.hinge_aileron, f.static) = felt
 
 
 @kernel
 def recall_loads(block: Any, j: int) -> tuple:
-    """The numbers of `loads` of one aircraft."""
-    a = LOADS*LANES + j
-    return (block[a], block[a + LANES], block[a + 2*LANES], block[a + 3*LANES], block[a + 4*LANES],
-            block[a + 5*LANES], block[a + 6*LANES], block[a + 7*LANES], block[a + 8*LANES], block[a + 9*LANES],
-            block[a + 10*LANES], block[a + 11*LANES], block[a + 12*LANES], block[a + 13*LANES], block[a + 14*LANES])
+    """What `store_loads` put away."""
+    f = lane(block, AT_LOADS, j, LOADS)
+    return (f.fx, f.fy, f.fz, f.roll, f.pitch, f.yaw, f.airspeed, f.alpha, f.beta, f.density, f.thrust_left,
+            f.thrust_right, f.hinge_elevator, f.hinge_aileron, f.static)
+
+
+@apart
+def meet_far_air(block: Any, count: int) -> None:
+    """`meet_air` of the aircraft of a block for which `meet_air_near` does not hold."""
+    for j in range(count):
+        if block[FAILS*LANES + j] != 0.0:
+            x = lane(block, NOW, j, CONTINUOUS)
+            attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
+            store_air(block, j, meet_air(x, attitude, lane(block, AT_GUSTS, j, GUSTS),
+                                         lane(block, AT_CURRENT, j, CURRENT),
+                                         lane(block, AT_PARAMETERS, j, PARAMETERS)))
 
 
 @kernel
 def meet_air_block(block: Any, count: int) -> None:
-    """`meet_air` of every aircraft of a block: the straight-line form for all, then the few for which it fails."""
+    """`meet_air` of every aircraft of a block."""
     for j in range(count):
         x = lane(block, NOW, j, CONTINUOUS)
         air, holds = meet_air_near(x, direction_cosines(x.e0, x.e1, x.e2, x.e3), lane(block, AT_GUSTS, j, GUSTS),
                                    lane(block, AT_CURRENT, j, CURRENT), lane(block, AT_PARAMETERS, j, PARAMETERS))
-        store(block, AIR, j, air)
+        store_air(block, j, air)
         block[FAILS*LANES + j] = 0.0 if holds else 1.0
+    fails = 0.0
     for j in range(count):
-        if block[FAILS*LANES + j] != 0.0:
-            x = lane(block, NOW, j, CONTINUOUS)
-            air = meet_air(x, direction_cosines(x.e0, x.e1, x.e2, x.e3), lane(block, AT_GUSTS, j, GUSTS),
-                           lane(block, AT_CURRENT, j, CURRENT), lane(block, AT_PARAMETERS, j, PARAMETERS))
-            store(block, AIR, j, air)
+        fails += block[FAILS*LANES + j]
+    if fails > 0.0:  # apart, or the compiler would make vectors of what hardly ever runs
+        meet_far_air(block, count)
 
 
 @kernel
@@ -93,13 +116,13 @@ def feel_block(block: Any, count: int) -> None:
     for j in range(count):
         felt = loads(lane(block, NOW, j, CONTINUOUS), recall_air(block, j), lane(block, AT_GUSTS, j, GUSTS),
                      lane(block, AT_CURRENT, j, CURRENT), lane(block, AT_PARAMETERS, j, PARAMETERS))
-        store(block, LOADS, j, felt)
+        store_loads(block, j, felt)
 
 
 @kernel
 def rk4_block(block: Any, count: int, dt: float) -> None:
     """Advance the first `count` aircraft of a block by `dt`; the continuous state is in the record TRIAL."""
-    size = N_CONTINUOUS*(len(block)//ROWS)  # LANES, but not known to the compiler: see `put`
+    size = N_CONTINUOUS*LANES
     put(block, START, TRIAL, size)
     put(block, TOTAL, TRIAL, size)
     for k in range(STAGES):

@@ -19,13 +19,14 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 from numba.core import config
 from numba.core.event import Event, Listener, register
+from numba.core.registry import CPUDispatcher
 
 F = TypeVar("F", bound=Callable[..., Any])
 BESIDE = "ICING_COMPILES_BESIDE"  # in the environment of a process that `compile_beside` began
@@ -85,27 +86,52 @@ def compiles_beside() -> bool:
     return BESIDE in os.environ
 
 
-@cache
-def compile_beside(module: str) -> None:
+@cache  # which also keeps the process from being thought forgotten
+def compile_beside(module: str) -> subprocess.Popen[bytes] | None:
     """At a cold start, compile in a second process what this one will need after the plant: run `module` there.
 
     The processes meet in the cache. Whichever comes first to an entry compiles it; if the second fails, this one does
     all of it.
     """
     cold = not any(Path(cache_folder("icing_env")).rglob("*.nbi"))
-    if cold and not compiles_beside() and (os.cpu_count() or 1) > 1:
-        subprocess.Popen([sys.executable, "-m", module], env=os.environ | {BESIDE: "1"}, stdin=subprocess.DEVNULL,
-                         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    if not cold or compiles_beside() or (os.cpu_count() or 1) < 2:
+        return None
+    return subprocess.Popen([sys.executable, "-m", module], env=os.environ | {BESIDE: "1"}, stdin=subprocess.DEVNULL,
+                            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+class Building(CPUDispatcher):  # type: ignore[misc]
+    """A compiled function that other compiled functions call.
+
+    What Python would need in order to call it takes a fifth of the time to compile, so it is made when Python first
+    does: tests do, flights do not.
+    """
+
+    @cached_property
+    def called_from_python(self) -> Any:
+        """The same function as Python calls it."""
+        return numba.njit(self.py_func, error_model="numpy")
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it from Python."""
+        return self.called_from_python(*arguments)
+
+
+def _building(function: F, **options: bool) -> F:
+    if config.DISABLE_JIT:
+        return function
+    options |= {"nopython": True, "no_cfunc_wrapper": True, "no_cpython_wrapper": True}
+    return Building(function, targetoptions={**options, "error_model": "numpy"})  # type: ignore[no-any-return]
 
 
 def kernel(function: F) -> F:
-    """Compile a scalar building block into its callers; called only from other compiled functions."""
-    return numba.njit(function, error_model="numpy", forceinline=True, no_cfunc_wrapper=True)  # type: ignore[no-any-return]
+    """Compile a scalar building block into its callers; made to be called from other compiled functions."""
+    return _building(function, forceinline=True)
 
 
 def block(function: F) -> F:
     """Compile a large piece that is called from several places: kept as one function, so that it compiles once."""
-    return numba.njit(function, error_model="numpy", no_cfunc_wrapper=True)  # type: ignore[no-any-return]
+    return _building(function)
 
 
 def entry(function: F) -> F:
