@@ -17,6 +17,9 @@ Identify = Callable[..., dict[str, Estimate]]
 METHODS: dict[str, str] = {  # name: module
     "stepwise": "estimators.regression.equation_error",
     "orthogonal": "estimators.regression.orthogonal",
+    "output_error": "estimators.likelihood.output_error",
+    "frequency_domain": "estimators.likelihood.frequency_domain",
+    "filter_error": "estimators.likelihood.filter_error",
     "hinf": "estimators.hinf.record",
     "rls": "estimators.recursive.rls",
     "real_time_frequency": "estimators.recursive.real_time_frequency",

@@ -20,17 +20,23 @@ from icing_env.record import FloatArray
 PULSE = 1e-3  # rad
 
 
-def with_control_noise(plan: Model, best: MaximumLikelihood, there: NDArray[np.bool_]) -> FloatArray:
+def with_control_noise(
+    plan: Model, best: MaximumLikelihood, there: NDArray[np.bool_], rows: FloatArray | None = None
+) -> FloatArray:
     """Covariance (p, p): the larger of that found from the residual and that expected from the noise.
 
     Args:
         plan: the model that was fitted.
         best: the fit.
         there: (5,) outputs that were fitted.
+        rows: (M, N) what was fitted of the samples; every `thin`-th by default.
     """
     steps, thin = len(plan.flown.data), plan.flown.thin
     weighted = np.zeros((steps, *best.sensitivity.shape[1:]))
-    weighted[::thin] = best.sensitivity / best.noise[:, None]
+    if rows is None:
+        weighted[::thin] = best.sensitivity / best.noise[:, None]
+    else:
+        weighted[:] = np.tensordot(rows.T, best.sensitivity / best.noise[:, None], axes=1)
     size = next_fast_len(2 * steps, real=True)
     spectrum = rfft(weighted, size, axis=0)
     middle = np.zeros_like(best.covariance)

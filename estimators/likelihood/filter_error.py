@@ -18,17 +18,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimators.estimate import Estimate
-from estimators.likelihood.equations import FIRST_GUST, STATES
-from estimators.likelihood.inputs import OUTPUTS, Flown, flown
+from estimators.likelihood.equations import FIRST_GUST, STATES, VANE
+from estimators.likelihood.inputs import OUTPUTS, flown, white_noise
 from estimators.likelihood.model import COUNT, NAMES, Model, model, quasi_steady
 from estimators.likelihood.newton import Point, descend
-from estimators.likelihood.output_error import FEW, MOST, axes, best_flight, r_squared, starting_values
+from estimators.likelihood.output_error import FEW, MOST, axes, r_squared, starting_values
 from estimators.likelihood.report import Found, estimates
 from estimators.likelihood.simulate import filtered_flight
 from estimators.regression.equations import EXCITED, SURFACES, movement
 from estimators.signals.coefficients import Airframe, airframe_of
 from estimators.signals.data_checks import check
-from estimators.signals.resample import common_grid
+from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
 
@@ -38,11 +38,12 @@ SPREAD = {"longitudinal": (1.0, 0.02, 0.01, 0.01), "lateral": (1.0, 0.02, 0.02, 
 GUST, DRIVE, ACROSS = 0.3, 1e-5, 1e-6  # start: m/s, rad2/s3; and unmodelled acceleration across, m2/s3, held (assumed)
 # What is known beforehand, as standard deviations about zero or the start: in turbulence the kinematics no longer tell
 # an error of the vane from a gust, and in calm air the record does not show the gust's intensity (assumed).
-WIDE, SCALE, LAG, BIAS = 3.0, 0.03, 0.03, 0.1  # of the logarithm of an intensity; 1; s; m/s2
-LOG_STEP, LARGEST_LOG, FIRST_STEPS = 0.05, 1.0, 10
+WIDE = 3.0  # of the logarithm of an intensity
+KNOWN = {"scale": 0.03, "lag": 0.03, "az": 0.1, "ay": 0.1, "lift": 0.3}  # by the last word of a name: 1, s, m/s2, 1
+LOG_STEP, LARGEST_LOG, WIDENED = 0.05, 1.0, 4.0
 
 
-def identify(record: FlightRecord, start: float | None = 1.0, default: Airframe | None = None) -> dict[str, Estimate]:
+def identify(record: FlightRecord, start: float | None = None, default: Airframe | None = None) -> dict[str, Estimate]:
     """Derivatives by name as for output error, and `sigma_gust_w`, `sigma_gust_v` (m/s), the gusts' intensity.
 
     Args:
@@ -59,19 +60,19 @@ def identify(record: FlightRecord, start: float | None = 1.0, default: Airframe 
     for axis in axes(grid, record.meta.name):
         flight = flown(grid, airframe, axis)
         starts = tuple(n for n in ("start_w", "start_q", "start_theta", "start_v", "start_p", "start_r", "start_phi"))
-        likelihood = begin(model(flight, first, starts), model(flight, first))
+        likelihood = begin(model(flight, first, starts, gusts=True), grid)
         moved = any(movement(grid.time, grid.values[n], grid.good((n,))) >= EXCITED for n in SURFACES[axis])
         result.update(estimates(likelihood.found(MOST if moved else FEW), grid, METHOD))
     return result
 
 
-def begin(plan: Model, free: Model) -> "Likelihood":
-    """The likelihood of `plan`, to start where a few steps of output error on `free` lead."""
-    best, there = best_flight(free, FIRST_STEPS)
-    values = dict(zip(free.free_names, best.theta, strict=True))
-    theta = np.array([values[n] if n[0] == "C" else 0.0 for n in plan.free_names])
-    noise = best.noise
-    return Likelihood(plan, np.concatenate((theta, np.log([GUST, DRIVE, *noise]))))
+def begin(plan: Model, grid: Grid) -> Likelihood:
+    """The likelihood of `plan`, with noise as the second differences of the channels show it, widened."""
+    flight, names = plan.flown, OUTPUTS[plan.flown.axis]
+    share = WIDENED / flight.thin
+    there = [name for name, column in zip(names, flight.measured.T, strict=True) if np.isfinite(column).any()]
+    noise = [max(white_noise(grid.values[name]) * share, 1e-12) for name in there]
+    return Likelihood(plan, np.concatenate((plan.theta0, np.log([GUST, DRIVE, *noise]))))
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,7 @@ class Likelihood:
         drives[:, 0], drives[:, 1], drives[:, 2] = logs[:, 0], ACROSS, logs[:, 1]
         first, spread = np.zeros(STATES), np.zeros(STATES)
         first[: COUNT[flight.axis]], spread[:FIRST_GUST] = flight.start, SPREAD[flight.axis]
+        first[VANE], spread[VANE] = flight.measured[np.isfinite(flight.measured[:, 0]), 0][0], SPREAD[flight.axis][-1]
         steady = bool(np.isfinite(flight.measured[:: flight.thin, self.there]).all())
         out = filtered_flight(flight.index, np.ascontiguousarray(whole), noises, drives, first, spread, flight.data,
                               flight.inverse, flight.measured, flight.thin, steady, flight.dt)  # fmt: skip
@@ -106,8 +108,7 @@ class Likelihood:
     @property
     def spread(self) -> FloatArray:
         """Standard deviations of what is known beforehand; infinite for the derivatives."""
-        known = {"scale": SCALE, "lag": LAG, "az": BIAS, "ay": BIAS}
-        of = [known.get(name.split("_")[-1], np.inf) if name[0] != "C" else np.inf for name in self.plan.free_names]
+        of = [KNOWN.get(name.split("_")[-1], np.inf) if name[0] != "C" else np.inf for name in self.plan.free_names]
         return np.array([*of, *[WIDE] * (2 + len(self.there))])
 
     def _prior(self, thetas: FloatArray) -> FloatArray:
@@ -119,7 +120,7 @@ class Likelihood:
         v, s = self.fly(thetas)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             cost = 0.5 * np.sum(v * v / s + np.log(s), axis=(1, 2)) + 0.5 * np.sum(self._prior(thetas) ** 2, axis=1)
-        return np.where(np.isfinite(cost), cost, np.inf)
+        return np.asarray(np.where(np.isfinite(cost), cost, np.inf), dtype=np.float64)
 
     def expand(self, theta: FloatArray, step: FloatArray | None) -> Point:
         """J, gradient and information; as detail the innovations and their variances."""

@@ -12,6 +12,7 @@ from estimators.likelihood.equations import (
     LONGITUDINAL_NAMES,
     LONGITUDINAL_STATES,
     ROW_LONGITUDINAL,
+    VANE_LAG,
 )
 from estimators.likelihood.inputs import OUTPUTS, Flown
 from estimators.likelihood.simulate import free_flight
@@ -27,9 +28,11 @@ INSTRUMENTS = {
     "longitudinal": ("alpha_scale", "alpha_lag", "theta_lag", "bias_q", "bias_az"),
     "lateral": ("beta_scale", "beta_lag", "phi_lag", "bias_p", "bias_ay"),
 }
+GUSTS = ("tail_lift", "gust_lag")
 # A gyro's constant error, an accelerometer's and that of attitude are told apart by one equation too few: the force
 # across the path. Those named above are free, the others zero.
-TYPICAL = {"alpha_scale": 0.1, "beta_scale": 0.1, "alpha_lag": 0.05, "theta_lag": 0.05, "beta_lag": 0.05, "phi_lag": 0.05, "bias_az": 0.1,
+TYPICAL = {"alpha_scale": 0.1, "beta_scale": 0.1, "alpha_lag": 0.05, "theta_lag": 0.05,
+           "beta_lag": 0.05, "phi_lag": 0.05, "gust_lag": 0.05, "bias_az": 0.1,
            "bias_ay": 0.1, "start_w": 0.5, "start_v": 0.5}  # fmt: skip
 CM_ALPHADOT = -8.0  # JSBSim's DHC-6 (configs/aircraft/twin_otter.toml); the record cannot tell it from Cm_q
 SMALL, STEP = 0.02, 0.01  # typical size of what is not named above; difference step over value or typical size
@@ -72,28 +75,34 @@ class Model:
     def simulate(self, thetas: FloatArray) -> FloatArray:
         """Outputs (m, N, 5) in free flight through the record's inputs."""
         whole, count = self.spread(thetas), len(NAMES[self.flown.axis])
-        out = free_flight(self.flown.index, np.ascontiguousarray(whole[:, :count]),
-                          np.ascontiguousarray(whole[:, count:]), self.flown.data, self.flown.inverse, self.flown.dt)  # fmt: skip
+        parameters, starts = np.ascontiguousarray(whole[:, :count]), np.ascontiguousarray(whole[:, count:])
+        flight = self.flown
+        out = free_flight(flight.index, parameters, starts, flight.data, flight.inverse, flight.dt)
         return np.asarray(out, dtype=np.float64)
 
 
-def model(flown: Flown, start: dict[str, float], fixed: tuple[str, ...] = ()) -> Model:
+def model(flown: Flown, start: dict[str, float], fixed: tuple[str, ...] = (), gusts: bool = False) -> Model:
     """The model of one axis.
 
     Args:
         start: value of each parameter that does not start at zero.
         fixed: names kept at their start. What only an absent output could tell is kept there too.
+        gusts: free what only matters to gusts.
     """
     names = (*NAMES[flown.axis], *STATE_NAMES[flown.axis])
     absent = [o for o, column in zip(OUTPUTS[flown.axis], flown.measured.T, strict=True) if np.isnan(column).all()]
     base = np.array([start.get(name, 0.0) for name in names])
     if "Cm_alphadot" not in start and flown.axis == "longitudinal":
         base[names.index("Cm_alphadot")] = CM_ALPHADOT
+    if flown.axis == "longitudinal":
+        base[names.index("tail_lift")] = 1.0
+    base[names.index("gust_lag")] = VANE_LAG
     base[len(NAMES[flown.axis]):] = flown.start
     tied = {*fixed, *(n for n in NAMES[flown.axis] if "_" in n and OUTPUT_OF.get(n.split("_")[0]) in absent)}
     tied |= {f"bias_{o}" for o in absent} | {f"{o}_lag" for o in absent}
     tied |= {"Cm_alphadot", "start_downwash"}
     instruments = {n for n in NAMES[flown.axis] if n.split("_")[0] not in OUTPUT_OF} - set(INSTRUMENTS[flown.axis])
+    instruments -= set(GUSTS) if gusts else set()
     free = tuple(i for i, name in enumerate(names) if name not in tied | instruments)
     return Model(flown, names, base, free)
 

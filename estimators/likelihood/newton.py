@@ -162,8 +162,8 @@ def descend(
         inverse, full_rank = inverse_information(point.information)
         move = inverse @ point.gradient
         farthest = move if limit is None else np.clip(move, -limit, limit)
-        left = float(np.sqrt(max(point.gradient @ move, 0.0)))
-        settled = bool(np.max(np.abs(point.noise - last_noise) / point.noise) < NOISE_CHANGE)
+        left = float(max(point.gradient @ move, 0.0)) ** 0.5
+        settled = float(np.max(np.abs(point.noise - last_noise) / point.noise)) < NOISE_CHANGE
         if change < 1.0 and abs(point.cost - last) < COST_CHANGE * abs(point.cost) and settled and left < GRADIENT:
             converged, reason = True, f"converged in {iterations} steps"
             break
@@ -208,7 +208,7 @@ class _Problem:
 
     def residuals(self, thetas: FloatArray) -> FloatArray:
         """Measured minus model, (m, N, k)."""
-        return np.where(self.present, self.measured - self.simulate(thetas), 0.0)
+        return np.asarray(np.where(self.present, self.measured - self.simulate(thetas), 0.0), dtype=np.float64)
 
     def costs(self, thetas: FloatArray) -> FloatArray:
         """J of parameter sets (m, p) with R at its best: (m,); infinite where the model did not fly."""
@@ -218,7 +218,7 @@ class _Problem:
         squares = np.sum(residuals**2, axis=1)
         noise = np.maximum(squares / self.count, self.least)
         cost = 0.5 * np.sum(squares / noise + self.count * np.log(noise), axis=1)
-        return np.where(np.isfinite(cost), cost, np.inf)
+        return np.asarray(np.where(np.isfinite(cost), cost, np.inf), dtype=np.float64)
 
     def expand(self, theta: FloatArray, step: FloatArray | None) -> Point:
         """J, gradient, information, R, and as detail the residual (N, k) and the sensitivities (N, k, p)."""

@@ -19,7 +19,7 @@ from estimators.airframe import published_airframe
 from estimators.estimate import Estimate
 from estimators.likelihood.control_noise import with_control_noise
 from estimators.likelihood.equations import ROW_LATERAL
-from estimators.likelihood.inputs import OUTPUTS, Flown, flown
+from estimators.likelihood.inputs import CUTOFF, OUTPUTS, Flown, flown
 from estimators.likelihood.model import Model, model, quasi_steady
 from estimators.likelihood.newton import MaximumLikelihood, fit
 from estimators.likelihood.report import Found, estimates
@@ -63,7 +63,7 @@ def identify(
     airframe, first = airframe_of(record, default), starting_values(record, start, default)
     result: dict[str, Estimate] = {}
     for axis in axes(grid, record.meta.name):
-        plan = _plan(flown(grid, airframe, axis, structure == "full"), first, structure)
+        plan = plan_of(flown(grid, airframe, axis, structure == "full"), first, structure)
         moved = any(movement(grid.time, grid.values[n], grid.good((n,))) >= EXCITED for n in SURFACES[axis])
         result.update(estimates(_fitted(plan, MOST if moved else FEW), grid, f"output error, {structure}"))
     return result
@@ -90,7 +90,7 @@ def starting_values(record: FlightRecord, start: float | None, default: Airframe
             for name, value in values.items()}  # fmt: skip
 
 
-def _plan(flown_axis: Flown, first: dict[str, float], structure: str) -> Model:
+def plan_of(flown_axis: Flown, first: dict[str, float], structure: str) -> Model:
     """The free parameters of one axis, and where they start."""
     if structure == "full":
         return model(flown_axis, first)
@@ -117,12 +117,13 @@ def _fitted(plan: Model, most: int) -> Found:
     failure = "" if best.converged else f"output error did not converge: {best.reason}"
     r2 = r_squared(best.residual, plan.flown.measured[:: plan.flown.thin, there], outputs)
     theta, covariance = quasi_steady(plan, best.theta, with_control_noise(plan, best, there))
-    return Found(plan.flown.axis, plan.free_names, theta, covariance, r2, failure, _warning(best, plan.flown))
+    warning = turbulence(np.repeat(best.residual[:, 0], plan.flown.thin), plan.flown)
+    return Found(plan.flown.axis, plan.free_names, theta, covariance, r2, failure, warning)
 
 
 def best_flight(plan: Model, most: int = MOST) -> tuple[MaximumLikelihood, NDArray[np.bool_]]:
     """The fit of a model in at most so many steps, and which outputs (5,) were there to be fitted."""
-    there = np.isfinite(plan.flown.measured).any(axis=0)
+    there = present(plan.flown)
 
     def simulate(thetas: FloatArray) -> FloatArray:
         return plan.simulate(thetas)[:, :: plan.flown.thin, there]
@@ -131,17 +132,23 @@ def best_flight(plan: Model, most: int = MOST) -> tuple[MaximumLikelihood, NDArr
     return fit(simulate, plan.theta0, measured, step=plan.step(plan.theta0), most=most), there
 
 
+def present(flight: Flown) -> NDArray[np.bool_]:
+    """Which outputs (5,) were measured."""
+    return np.asarray(np.isfinite(flight.measured).any(axis=0), dtype=np.bool_)
+
+
 def r_squared(residual: FloatArray, measured: FloatArray, outputs: list[str]) -> dict[str, float]:
     """1 - sum v2 / sum (z - zbar)2 of each output."""
     total = np.nansum((measured - np.nanmean(measured, axis=0)) ** 2, axis=0)
     return dict(zip(outputs, (1.0 - np.sum(residual**2, axis=0) / np.maximum(total, 1e-300)).tolist(), strict=True))
 
 
-def _warning(best: MaximumLikelihood, flown_axis: Flown) -> str:
-    """A sentence where the flow angle's residual is long waves of more than calm air has."""
-    v = best.residual[:, 0]
+def turbulence(residual: FloatArray, flight: Flown) -> str:
+    """A sentence where the flow angle's residual (N,) at the flight's rate is long waves of more than calm air has."""
+    apart = max(1, int(0.5 / (CUTOFF * flight.dt)))
+    v = residual[: len(residual) // apart * apart].reshape(-1, apart).mean(axis=1)
     waves = float(np.var(v) / max(0.5 * np.var(np.diff(v)), 1e-300))  # 1 for white noise
-    gust = flown_axis.airspeed * float(np.std(v))
+    gust = flight.airspeed * float(np.std(v))
     if waves < WAVES or gust < GUST:
         return ""
     return (f"the flow angle leaves the model in long waves of {gust:.2f} m/s, as in turbulence, which output error "

@@ -15,9 +15,11 @@ from estimators.signals.resample import Grid
 from icing_env.record import FloatArray
 
 ALIKE = 0.99  # correlation of two estimates beyond which only a combination of them is known (assumed)
-UNITS = {"CX_alpha2": "1/rad2", "alpha_scale": "1", "beta_scale": "1", "alpha_lag": "s", "beta_lag": "s", "theta_lag": "s", "phi_lag": "s",
-         "bias_q": "rad/s", "bias_p": "rad/s", "bias_r": "rad/s", "bias_az": "m/s2", "bias_ay": "m/s2",
-         "bias_phi": "rad", "bias_theta": "rad", "sigma_gust_w": "m/s", "sigma_gust_v": "m/s"}  # fmt: skip
+UNITS = {
+    "CX_alpha2": "1/rad2", "alpha_scale": "1", "beta_scale": "1", "tail_lift": "1", "gust_lag": "s",
+    "alpha_lag": "s", "beta_lag": "s", "theta_lag": "s", "phi_lag": "s", "bias_q": "rad/s", "bias_p": "rad/s",
+    "bias_az": "m/s2", "bias_ay": "m/s2", "bias_phi": "rad", "sigma_gust_w": "m/s", "sigma_gust_v": "m/s",
+}  # fmt: skip
 ZERO = 1e-5  # relative step of the slopes of derived quantities
 
 
@@ -113,7 +115,7 @@ def _lift_and_drag(found: Found, alpha: float) -> list[tuple[str, float, float]]
             sides = [function(dict(zip(names, found.theta + s * width * np.eye(len(names))[i], strict=True)))
                      for s in (1.0, -1.0)]  # fmt: skip
             slopes[i] = (sides[0] - sides[1]) / (2.0 * width)
-        result.append((name, float(value), float(np.sqrt(max(slopes @ found.covariance @ slopes, 0.0)))))
+        result.append((name, float(value), float(max(slopes @ found.covariance @ slopes, 0.0)) ** 0.5))
     return result
 
 

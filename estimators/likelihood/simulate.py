@@ -39,7 +39,9 @@ def rate(F: Any, b: Any, x: Any, out: Any, n: int) -> None:
 
 
 @block
-def runge_kutta(F0: Any, b0: Any, F1: Any, b1: Any, x: Any, k: Any, mid: Any, Fm: Any, bm: Any, dt: float, n: int) -> None:
+def runge_kutta(
+    F0: Any, b0: Any, F1: Any, b1: Any, x: Any, k: Any, mid: Any, Fm: Any, bm: Any, dt: float, n: int
+) -> None:  # fmt: skip
     """One step of fourth order of x' = F x + b, whose rows go in straight lines from one sample to the next."""
     for i in range(n):
         bm[i] = 0.5 * (b0[i] + b1[i])
