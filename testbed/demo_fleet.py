@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from testbed.environments import loop_factory
 
 Cloud = tuple[NDArray[np.float64], NDArray[np.float64]]  # water kg/m3 and drop diameter m, each (seconds, aircraft)
 NONE, LIMITS, ALL = "no protection", "limits alone", "boots and limits"
-LOOPS = {
+LOOPS: dict[str, dict[str, Any]] = {
     NONE: {"observer": False, "management": False, "protection": False},
     LIMITS: {"boots": False},
     ALL: {},

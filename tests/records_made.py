@@ -6,8 +6,9 @@ import numpy as np
 
 from icing_env.record import FlightRecord, Geometry, RecordMeta
 
-LEFT_OUT = ("time", "lwc", "mvd", "torque_left", "torque_right", "rpm_left", "rpm_right", "ground_speed", "track", "psi",
-            "hinge_moment_elevator", "hinge_moment_aileron", "throttle_left", "throttle_right", "altitude")  # fmt: skip
+LEFT_OUT = ("time", "lwc", "mvd", "torque_left", "torque_right", "rpm_left", "rpm_right", "ground_speed", "track",
+            "psi", "hinge_moment_elevator", "hinge_moment_aileron", "throttle_left", "throttle_right",
+            "altitude")  # fmt: skip
 
 
 def record_of(measurement: np.ndarray, airframe: np.ndarray, without: tuple[str, ...] = ()) -> FlightRecord:

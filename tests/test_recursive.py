@@ -16,9 +16,12 @@ from estimators.observer.choice import OBSERVERS, observer
 from estimators.observer.layout import ACCELEROMETER, COUNT, FIRST, PARAMETER_NAMES, clean_values
 from estimators.recursive import real_time_frequency, rls
 from estimators.regression.equation_error import identify as equation_error
+from icing_env import scenario
 from icing_env.errors import InputError
-from icing_env.record import read
+from icing_env.record import FlightRecord, read
 from icing_env.types import ESTIMATE, ESTIMATED_NAMES
+from icing_env.world import World
+from testbed.environments import loop_factory
 
 DT = 0.02
 RIVALS = [name for name in OBSERVERS if name != "hinf"]
@@ -32,6 +35,21 @@ NOISE_FREE = {"rls": 0.02, "real_time_frequency": 0.02, "ekf": 0.05, "ukf": 0.05
 @cache
 def flight() -> np.ndarray:
     return fly(published_airframe(), 20.0, DT)
+
+
+@cache
+def changed() -> tuple[np.ndarray, np.ndarray]:
+    """Another aircraft, and the same flight by it."""
+    iced = published_airframe()
+    iced["CZ_alpha"], iced["CX_0"] = -4.8, -0.08
+    return iced, fly(iced, 20.0, DT)[1:]
+
+
+@cache
+def records() -> list[tuple[FlightRecord, dict[str, float]]]:
+    """Flights of doublets with noise, and their true derivatives."""
+    cases = ((longitudinal, PITCH), (lateral, LATERAL))
+    return [(make(seed), derivatives) for make, derivatives in cases for seed in range(4)]
 
 
 @cache
@@ -104,11 +122,9 @@ def test_calm_flight_widens_nothing_beyond_the_prior_and_teaches_nothing(name: s
 @pytest.mark.parametrize("name", RIVALS)
 def test_intervals_hold_the_truth_in_calm_air(name: str) -> None:
     """Estimates +- 1.96 standard errors over seeds: at least nine in ten of all of them hold the truth."""
-    cases = ((longitudinal, PITCH), (lateral, LATERAL))
     inside = [
         abs(found[n].estimate - value) < 1.96 * found[n].std_error
-        for make, derivatives in cases
-        for found in (method(name)(make(seed)) for seed in range(4))
+        for found, derivatives in ((method(name)(record), truth) for record, truth in records())
         for n, value in derivatives.items()
         if n in found and not n.endswith("_0")
     ]
@@ -141,9 +157,8 @@ def test_recursive_least_squares_that_forgets_nothing_is_the_observer_at_infinit
 
 @pytest.mark.parametrize("name", ["rls", "real_time_frequency"])
 def test_a_change_in_flight_is_followed(name: str) -> None:
-    iced = published_airframe()
-    iced["CZ_alpha"], iced["CX_0"] = -4.8, -0.08
-    out, _ = run(name, np.concatenate([flight(), *(fly(iced, 20.0, DT)[1:] for _ in range(2))])[:, None])
+    iced, then = changed()
+    out, _ = run(name, np.concatenate([flight(), then, then])[:, None])
     after = dict(zip(PARAMETER_NAMES, clean_values(iced)[0], strict=True))
     assert out["excess_drag"][-1, 0] == pytest.approx(after["CD_0"] - truth()["CD_0"], rel=0.05)
     left = abs(out["CL_alpha"][-1, 0] - after["CL_alpha"]) / abs(truth()["CL_alpha"] - after["CL_alpha"])
@@ -213,3 +228,19 @@ def test_every_observer_is_a_method_and_an_unknown_one_is_named() -> None:
     with pytest.raises(InputError, match="did you mean 'ekf'"):
         observer("ekff")
     assert sum(COUNT) == 26 and FIRST[-1] + COUNT[-1] == 26
+
+
+@pytest.mark.parametrize("name", ["hinf", "rls", "real_time_frequency"])
+def test_it_can_be_the_observer_in_the_loop(name: str) -> None:
+    """Twenty seconds of doublets in the environment: estimates learned in flight near the true coefficients."""
+    flown = scenario.load("clear_air", duration=25.0, events=({"time": 2.0, "name": "set", "doublets": True},))
+    world = World(flown, 1, loop_factory(management=False, protection=False, boots=False, estimator=name), mode=None)
+    world.reset()
+    for _ in range(1200):
+        world.step()
+    estimate = world.loop.estimate
+    assert estimate["health"][0] == 1.0
+    assert estimate["Cm_alpha"][0] != truth()["Cm_alpha"]
+    assert estimate["Cm_elevator"][0] == pytest.approx(truth()["Cm_elevator"], rel=0.1)
+    with pytest.raises(InputError, match="unknown"):
+        World(flown, 1, loop_factory(estimator="no"), mode=None)

@@ -15,6 +15,7 @@ from estimators.observer.layout import SEEN_NAMES
 from estimators.observer.record import STARTS, History, Method
 from icing_env.record import FlightRecord
 
+__all__ = ["METHOD", "STARTS", "History", "histories", "history", "identify"]
 METHOD = Method("H-infinity", hinf.init, hinf.step, default_tuning, (*SEEN_NAMES, "b3"))
 
 
