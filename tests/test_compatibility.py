@@ -11,10 +11,11 @@ from flights import META, flight_data, lateral
 from scipy.integrate import solve_ivp
 
 from estimators.compatibility.flow_angles import at_centre_of_gravity
-from estimators.compatibility.gusts import LENGTH, measure, whitening
+from estimators.compatibility.gusts import measure, whitening
 from estimators.compatibility.kinematics import COUNT, PARAMETERS, simulate
 from estimators.compatibility.record import check_compatibility, corrected, made_compatible
 from estimators.regression.equation_error import identify
+from estimators.signals.gust_level import LENGTH
 from icing_env import scenario as scenarios
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, read

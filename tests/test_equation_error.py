@@ -16,8 +16,12 @@ from estimators.regression.stepwise import Criteria, stepwise
 from estimators.signals.coefficients import Airframe, airframe_of
 from estimators.signals.data_checks import check
 from estimators.signals.differentiate import low_pass, matched_kernel, slope, smooth
+from estimators.signals.gust_level import gust_level
+from estimators.signals.resample import common_grid
+from icing_env import scenario as scenarios
 from icing_env.errors import InputError
 from icing_env.record import read
+from testbed.flight import fly
 
 # Klein & Morelli, Aircraft System Identification (AIAA 2006), examples 5.1 and 5.2 as SIDPAC prints them: value,
 # standard error corrected for coloured residuals, decimals of each.
@@ -299,3 +303,17 @@ def test_filters_that_do_not_match_shrink_damping_and_elevator_power(
 def test_what_was_not_flown_has_no_competition() -> None:
     assert set(histories(read(flight_data("totter_demo_data.mat")))) == {"CZ", "CL", "Cm"}
     assert set(histories(read(flight_data("totter_f1_017_data.mat")))) == {"CY", "Cl", "Cn"}
+
+
+def test_gusts_are_measured_in_any_record_and_warned_of() -> None:
+    for sigma in (0.0, 0.5, 1.0, 2.0):
+        scenario = scenarios.load("clear_air", aircraft="twin_otter_flight", duration=29.0,
+                                  parameters={"turbulence_sigma_w": sigma})  # fmt: skip
+        record = fly(scenario, seed=2, observer=False, protection=False).record
+        record = record.take(record.time >= 8.0)
+        found = gust_level(common_grid(record))
+        for level in found.values():
+            assert level == pytest.approx(sigma, rel=0.4, abs=0.15)
+        assert ("turbulence of about" in identify(record)["Cm_alpha"].warning) == (sigma > 0.6 or found["w"] > 0.35)
+    for name in ("totter_demo_data.mat", "totter_pred_data.mat", "totter_f1_017_data.mat"):
+        assert not any(e.warning for e in identify(read(flight_data(name))).values())

@@ -21,9 +21,9 @@ import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 from scipy.signal import lfilter
 
+from estimators.signals.gust_level import LENGTH
 from icing_env.record import FloatArray
 
-LENGTH = 533.4  # m: 1750 ft, MIL-F-8785C above 2000 ft; height above ground is not in a record
 RATIOS = np.concatenate(([0.0], np.geomspace(0.1, 100.0, 22)))  # gust over sensor noise, tried
 
 

@@ -13,13 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimators.compatibility.flow_angles import at_centre_of_gravity
-from estimators.compatibility.gusts import LENGTH, Whitening, measure
+from estimators.compatibility.gusts import Whitening, measure
 from estimators.compatibility.kinematics import OUTPUTS, SCALED
 from estimators.compatibility.model import ORDER, PLAUSIBLE, Filter, Model, Readings
 from estimators.compatibility.readings import NEEDED, candidates_of, readings_of, without_blanks
 from estimators.compatibility.selection import Found, select
 from estimators.estimate import Estimate
 from estimators.signals.data_checks import check
+from estimators.signals.gust_level import LENGTH
 from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import DataProblem, FlightRecord, FloatArray

@@ -8,7 +8,7 @@ smoothed and differentiated: estimators.regression.preparation. Equations: estim
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from estimators.regression.preparation import prepare
 from estimators.regression.stepwise import PRACTICE, Criteria, Stepwise, choose, stepwise
 from estimators.signals.coefficients import Airframe, airframe_of, thrust
 from estimators.signals.data_checks import check
+from estimators.signals.gust_level import turbulence_warnings
 from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
@@ -35,17 +36,34 @@ from icing_env.record import FlightRecord, FloatArray
 
 @dataclass(frozen=True)
 class Problem:
-    """A record as equations: `data` by name (N,), usable `rows` by target (N,), rms movement of surfaces (rad)."""
+    """A record as equations.
+
+    Attributes:
+        data: targets and regressors by name (N,).
+        rows: usable rows by target (N,).
+        moved: rms of each surface about its trend, rad.
+        thrust_known: whether drag and axial force are free of it.
+        warnings: by axis, where gusts bias what regression finds.
+    """
 
     data: Mapping[str, FloatArray]
     rows: Mapping[str, NDArray[np.bool_]]
     moved: Mapping[str, float]
     thrust_known: bool
+    warnings: Mapping[str, str]
 
     @property
     def equations(self) -> tuple[Equation, ...]:
         """The equations that the record has the channels for."""
         return tuple(equation for equation in EQUATIONS if equation.target in self.rows)
+
+    def finished(self, equation: Equation, found: dict[str, Estimate]) -> dict[str, Estimate]:
+        """Estimates of an equation with the warning of its axis; refused where they contain thrust not recorded."""
+        found = {name: replace(e, warning=self.warnings.get(equation.axis, "")) for name, e in found.items()}
+        if self.thrust_known or equation.target not in ("CD", "CX"):
+            return found
+        why = "thrust was not recorded and cannot be told from drag"
+        return {name: replace(e, identifiable=False, why=why) for name, e in found.items()}
 
     def flown(self, equation: Equation) -> bool:
         """Whether a surface of the equation's axis moved: without it products of noise and drift would compete."""
@@ -88,7 +106,7 @@ def identify(
         found = fit_equation(
             equation, data, rows, dict(problem.moved), f"equation error, {mode}", entered, mode == "textbook"
         )
-        result.update(without_thrust(found, equation, problem.thrust_known))
+        result.update(problem.finished(equation, found))
     return result
 
 
@@ -138,7 +156,7 @@ def pose(record: FlightRecord, mode: str, default: Airframe | None = None, half:
         equation.target: _usable(grid, equation, reach) & np.isfinite(data[equation.target])
         for equation in EQUATIONS if not axes[equation.axis] and equation.target in data
     }  # fmt: skip
-    return Problem(data, rows, moved, thrust(grid.values) is not None)
+    return Problem(data, rows, moved, thrust(grid.values) is not None, turbulence_warnings(grid, "regression"))
 
 
 def _usable(grid: Grid, equation: Equation, half: int) -> NDArray[np.bool_]:
@@ -148,11 +166,3 @@ def _usable(grid: Grid, equation: Equation, half: int) -> NDArray[np.bool_]:
         bad = np.convolve(bad, np.ones(2 * half + 1), mode="same") > 0.5
         bad[:half] = bad[len(bad) - half :] = True
     return ~bad
-
-
-def without_thrust(found: dict[str, Estimate], equation: Equation, known: bool) -> dict[str, Estimate]:
-    """Refuse drag and axial force where thrust was not recorded: they then contain it."""
-    if known or equation.target not in ("CD", "CX"):
-        return found
-    why = "thrust was not recorded and cannot be told from drag"
-    return {n: Estimate(e.estimate, e.std_error, e.unit, e.method, e.r2, False, why) for n, e in found.items()}

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimators.estimate import Estimate
-from estimators.regression.equation_error import Problem, pose, without_thrust
+from estimators.regression.equation_error import Problem, pose
 from estimators.regression.equations import (
     LARGEST_CORRELATION,
     Equation,
@@ -170,7 +170,7 @@ def identify(
     result: dict[str, Estimate] = {}
     for equation in problem.equations:
         found = _estimates(equation, problem, bound)
-        result.update(without_thrust(found, equation, problem.thrust_known))
+        result.update(problem.finished(equation, found))
     return result
 
 
