@@ -147,10 +147,11 @@ def trims(seed: int) -> list[Picture]:
 
 @lru_cache(maxsize=1)
 def clean_trims(seed: int) -> tuple[Window, ...]:
-    """A trimmed stretch of the clean aircraft at every speed, in light turbulence."""
+    """A trimmed stretch of the clean aircraft at every speed, in still air."""
     found = []
     for k, speed in enumerate(SPEEDS):
         scenario = scenarios.load("clear_air", duration=55.0, initial={"airspeed": speed}, ice_protection="off",
+                                  parameters={"turbulence_sigma_w": 0.0},
                                   events=({"time": 10.0, "name": "doublets", "doublets": True},))
         found.append(fly_sets(scenario, 1000*seed + k, hinf=False)[0]["doublets"])
     return tuple(found)
@@ -172,7 +173,8 @@ def _trims(clean: Sequence[Window], iced: Sequence[Window]) -> Figure:
 
 
 def drag_of(window: Window) -> float:
-    """Drag coefficient of steady level flight: thrust along the path over dynamic pressure and wing area."""
-    trim, area = window.trim, float(aircraft.load()["wing_area"][0])
-    thrust = (trim["thrust_left"] + trim["thrust_right"])*np.cos(trim["alpha"])
-    return float(thrust/(0.5*window.truth["density"]*trim["airspeed"]**2*area))
+    """Drag coefficient of the steady stretch before a doublet set, from accelerometers and thrust."""
+    trim, mass = window.trim, window.truth["mass"]
+    force = 0.5*window.truth["density"]*trim["airspeed"]**2*float(aircraft.load()["wing_area"][0])
+    axial = (mass*trim["ax"] - trim["thrust_left"] - trim["thrust_right"])/force
+    return float(-axial*np.cos(trim["alpha"]) - mass*trim["az"]/force*np.sin(trim["alpha"]))

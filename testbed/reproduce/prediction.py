@@ -6,13 +6,11 @@ constant coefficients, constant errors of instruments) is fitted to it.
 
 from __future__ import annotations
 
-from matplotlib.figure import Figure
-
 from estimators.estimate import Estimate
 from estimators.methods import METHODS, method
 from icing_env.record import FlightRecord, read
 from testbed.flown_again import FlownAgain, fly_again
-from testbed.plot_style import ROLES, legend_above, line, scale_of, styled
+from testbed.identify_figures import fit_histories
 from testbed.reproduce.pictures import Picture
 from testbed.reproduce.row import Row
 from testbed.textbook import folder
@@ -60,25 +58,6 @@ def pictures(seed: int) -> list[Picture]:
     pair = both()
     if pair is None:
         return []
-    figure = draw(predicted(method("stepwise")(pair[0]), pair[1]))
+    figure = fit_histories(predicted(method("stepwise")(pair[0]), pair[1]), {"elevator": pair[1]["elevator"]})
     return [Picture(figure, "Prediction: record 017 flown with the derivatives that stepwise regression found in "
                     "record 018. Dashed, measured.", "Predicted and measured histories lie on one another")]
-
-
-@styled
-def draw(flown: FlownAgain) -> Figure:
-    """Measured and simulated channels over time."""
-    names = [n for n in flown.measured if n in flown.simulated]
-    figure = Figure(figsize=(9.2, 0.7 + 1.35*len(names)), layout="constrained")
-    panels = list(figure.subplots(len(names), 1, sharex=True, squeeze=False).flat)
-    for axes, name in zip(panels, names, strict=True):
-        scale = scale_of(name)
-        line(axes, flown.time, flown.simulated[name]*scale.factor, **ROLES["estimate"], label="simulated")
-        line(axes, flown.time, flown.measured[name]*scale.factor, **ROLES["truth"], label="measured")
-        axes.set_ylabel(f"{scale.label}\n({scale.unit})")
-        axes.margins(x=0.0)
-        axes.annotate(f"R² {flown.r2[name]:.3f}", (0.99, 0.86), xycoords="axes fraction", ha="right")
-    panels[-1].set_xlabel("time (s)")
-    figure.align_ylabels()
-    legend_above(figure, panels)
-    return figure
