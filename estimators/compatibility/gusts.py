@@ -21,7 +21,6 @@ import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 from scipy.signal import lfilter
 
-from estimators.signals.gust_level import LENGTH
 from icing_env.record import FloatArray
 
 RATIOS = np.concatenate(([0.0], np.geomspace(0.1, 100.0, 22)))  # gust over sensor noise, tried
