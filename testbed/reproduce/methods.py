@@ -211,11 +211,12 @@ def draw(seed: int) -> Figure:
     low = np.array([PRINTED[line].low for line in lines])
     high = np.array([PRINTED[line].high for line in lines])
     axes.barh(y, high - low, 0.62, left=low, color=ROLES["clean"]["color"], alpha=0.4, label="paper's range")
-    for how, mark in zip(ABLATIONS, "sdv<^oooox", strict=True):
+    for how, mark in zip(ABLATIONS, "sdv<^ooooX", strict=True):
         means = [np.mean(differences(*line, how, seed)) for line in lines]
-        role = "protected" if "unmatched over" in how.name else "iced"
+        role = "truth" if how.name == CHAIN else "protected" if "unmatched over" in how.name else "iced"
+        size = 6.5 if how.name == CHAIN else 3.0 + 10.0*how.gust if "corrected" in how.name else 4.5
         axes.plot(means, y + 0.2, mark, color=GREY if how.analysis == "matched" else ROLES[role]["color"],
-                  markersize=3.0 + 10.0*how.gust if "corrected" in how.name else 4.5, linestyle="none", label=how.name)
+                  markersize=size, linestyle="none", label=how.name)
     main = [differences(*line, MAIN, seed) for line in lines]
     axes.errorbar([np.mean(m) for m in main], y, xerr=[interval(m) for m in main], fmt="o", capsize=2.5,
                   color=ROLES["estimate"]["color"], label="main comparison")
