@@ -80,7 +80,7 @@ def flown(grid: Grid, airframe: Airframe, axis: str, smooth: bool = True) -> Flo
     noise = np.array([white_noise(values[name]) for name in SURFACES[axis]])
     thin = max(1, int(0.5 / (CUTOFF * grid.dt))) if smooth else 1
     if thin > 1:
-        values.update({name: low_pass(values[name], grid.dt, CUTOFF) for name in FAST})
+        values.update({name: low_pass(values[name], grid.dt, CUTOFF) for name in FAST if name in values})
     columns = _common(values, grid.dt, airframe)
     columns.update((_longitudinal if axis == "longitudinal" else _lateral)(values, columns, airframe))
     data = np.column_stack([columns[name] for name in COLUMNS[axis]])

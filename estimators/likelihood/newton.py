@@ -162,7 +162,7 @@ def descend(
         inverse, full_rank = inverse_information(point.information)
         move = inverse @ point.gradient
         farthest = move if limit is None else np.clip(move, -limit, limit)
-        left = float(max(point.gradient @ move, 0.0)) ** 0.5
+        left = max(float(point.gradient @ move), 0.0) ** 0.5
         settled = float(np.max(np.abs(point.noise - last_noise) / point.noise)) < NOISE_CHANGE
         if change < 1.0 and abs(point.cost - last) < COST_CHANGE * abs(point.cost) and settled and left < GRADIENT:
             converged, reason = True, f"converged in {iterations} steps"

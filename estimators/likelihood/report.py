@@ -115,7 +115,7 @@ def _lift_and_drag(found: Found, alpha: float) -> list[tuple[str, float, float]]
             sides = [function(dict(zip(names, found.theta + s * width * np.eye(len(names))[i], strict=True)))
                      for s in (1.0, -1.0)]  # fmt: skip
             slopes[i] = (sides[0] - sides[1]) / (2.0 * width)
-        result.append((name, float(value), float(max(slopes @ found.covariance @ slopes, 0.0)) ** 0.5))
+        result.append((name, float(value), max(float(slopes @ found.covariance @ slopes), 0.0) ** 0.5))
     return result
 
 
