@@ -287,3 +287,12 @@ def test_a_training_goes_on_where_it_was_killed(tmp_path):
     assert not any("flying" in line for line in said)
     assert (tmp_path / "network.safetensors").read_bytes() == first
     assert characterise.__name__ and online.load("network", tmp_path)
+
+
+def test_the_card_tells_what_the_weights_and_seeds_are():
+    from icing_env.configuration import read_toml
+
+    card = read_toml("estimators", "characterise/card")
+    assert tuple(card["features"]) == FEATURES
+    assert {name: card["seeds"][name] for name in SEEDS} == SEEDS
+    assert card["command"] == read_toml("estimators", "characterise/thresholds")["command"]

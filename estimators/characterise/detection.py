@@ -3,7 +3,8 @@
 * detection: the score (log-odds that ice matters) above the threshold of the turbulence that is met for `confirm`
   seconds; released after `release` seconds below it by RELEASE. The threshold is interpolated between turbulence
   classes by the measured gust intensity. Nothing new is believed in air warmer than `warmest`.
-* onset: the last time that the score was no higher than halfway between its usual value in clear air and the threshold.
+* onset: the last time that the score was no higher than ONSET of the way from its usual value in clear air to the
+  threshold.
 * protection: each inflation (a rising edge, or a boot held on for a cycle) is an experiment. Severity `boot_after`
   seconds later is compared with that before it, under "works" (a share LEFT stays) and "failed" (everything stays);
   the log-likelihood ratios of successive inflations add up, each bounded by EVIDENCE_MOST.
@@ -21,6 +22,7 @@ from estimators.characterise.thresholds import Thresholds
 from estimators.characterise.tuning import Tuning
 
 FloatArray = NDArray[np.float64]
+ONSET = 0.25  # share of that way: above the scatter of clear air (assumed)
 RELEASE = 2.0  # log-odds below the threshold at which ice is let go (assumed)
 LEFT, LEFT_STD = 0.45, 0.15  # share that a working boot leaves: a quarter of thick, most of thin ice (assumed)
 KEPT_STD = 0.10  # by which severity may change over a failed inflation, relative (assumed: growth of a minute)
@@ -55,7 +57,8 @@ def detect(watch: NDArray[np.void], score: FloatArray, gust: FloatArray, tempera
     over = (score > limit) & (temperature < tuning.warmest)
     watch["above"] = np.where(over, watch["above"] + tuning.period, 0.0)
     watch["below"] = np.where(score < limit - RELEASE, watch["below"] + tuning.period, 0.0)
-    watch["quiet"] = np.where((score <= 0.5*(limit + usual)) & (watch["detected"] == 0.0), now, watch["quiet"])
+    watch["quiet"] = np.where((score <= usual + ONSET*(limit - usual)) & (watch["detected"] == 0.0), now,
+                              watch["quiet"])
     new = (watch["detected"] == 0.0) & over & (watch["above"] >= tuning.confirm)
     watch["onset"] = np.where(new, watch["quiet"], watch["onset"])
     watch["detected"] = np.where(new, 1.0, np.where(watch["below"] >= tuning.release, 0.0, watch["detected"]))
