@@ -29,8 +29,9 @@ def rows(seed: int) -> list[Row]:
         return []
     found = []
     for how in METHODS:
-        flown = predicted(method(how)(pair[0]), pair[1])
-        found += [_row(how, channel, flown) for channel in CHANNELS]
+        estimates = method(how)(pair[0])
+        flown = predicted(estimates, pair[1])
+        found += [_row(how, channel, flown, estimates) for channel in CHANNELS]
     return found
 
 
@@ -40,15 +41,19 @@ def both() -> tuple[FlightRecord, FlightRecord] | None:
     return (read(paths[0]), read(paths[1])) if all(path.is_file() for path in paths) else None
 
 
-def predicted(estimates: dict[str, Estimate], record: FlightRecord) -> FlownAgain:
-    """The longitudinal flight of a record by derivatives from elsewhere."""
-    return next(f for f in fly_again(record, estimates) if f.axis == "longitudinal")
+def predicted(estimates: dict[str, Estimate], record: FlightRecord) -> FlownAgain | None:
+    """The longitudinal flight of a record by derivatives from elsewhere; None where these were refused."""
+    return next((f for f in fly_again(record, estimates) if f.axis == "longitudinal"), None)
 
 
-def _row(how: str, channel: str, flown: FlownAgain) -> Row:
+def _row(how: str, channel: str, flown: FlownAgain | None, estimates: dict[str, Estimate]) -> Row:
+    quantity = f"{channel} of record 017 from the derivatives of 018 ({how})"
+    text = f"share of variance {GOOD:g} or more"
+    if flown is None:
+        return Row(ITEM, quantity, "recorded", "a good prediction", "refused", "1", None, False, text,
+                   estimates["Cm_alpha"].why)
     share = flown.r2[channel]
-    return Row(ITEM, f"{channel} of record 017 from the derivatives of 018 ({how})", "recorded", "a good prediction",
-               share, "1", None, share >= GOOD, f"share of variance {GOOD:g} or more",
+    return Row(ITEM, quantity, "recorded", "a good prediction", share, "1", None, share >= GOOD, text,
                "flown freely through the recorded elevator, speed and attitude; datum fitted")
 
 
@@ -58,6 +63,9 @@ def pictures(seed: int) -> list[Picture]:
     pair = both()
     if pair is None:
         return []
-    figure = fit_histories(predicted(method("stepwise")(pair[0]), pair[1]), {"elevator": pair[1]["elevator"]})
-    return [Picture(figure, "Prediction: record 017 flown with the derivatives that stepwise regression found in "
-                    "record 018. Dashed, measured.", "Predicted and measured histories lie on one another")]
+    flown = predicted(method("stepwise")(pair[0]), pair[1])
+    if flown is None:
+        return []
+    figure = fit_histories(flown, {"elevator": pair[1]["elevator"]})
+    return [Picture(figure, "Prediction: record 017 flown with the derivatives that stepwise regression found in record "
+                    "018. Dashed, measured.", "Predicted and measured histories lie on one another")]
