@@ -187,8 +187,8 @@ def inflated(after, inflations=2):
 
     for k in range(inflations):
         now = np.array([100.0 + 300.0*k])
-        on = np.array([[1.0, 0.0, 0.0, 0.0]])
-        detection.inflations(watch, 0.0*on, now - 1.0, judged(0.1), tuning)
+        on = np.array([[True, False, False, False]])
+        detection.inflations(watch, on & False, now - 1.0, judged(0.1), tuning)
         assert detection.inflations(watch, on, now, judged(0.1), tuning).tolist() == [[True, False, False, False]]
         detection.outcomes(watch, now + tuning.boot_after, judged(after))
     assert detection.verdicts(watch[0])["htail"] == "not tested"
@@ -208,6 +208,19 @@ def test_failed_boots_are_recognised_in_flight():
     p = np.stack([severity[f"p_failed_{part}"] for part in PARTS[:3]], axis=1)
     assert (p[broken] > 0.5).mean() >= 0.7
     assert (p[~broken] < 0.5).mean() >= 0.9
+
+
+def test_a_shot_between_two_judgements_is_seen():
+    memory, severity = online.init(1)
+    measurement, estimate, switches = np.zeros(1, MEASUREMENT), np.zeros(1, ESTIMATE), np.zeros(1, COMMAND)
+    for name, value in {"airspeed": 72.0, "pressure": 8e4, "temperature": 265.0, "az": -9.8}.items():
+        measurement[name] = value
+    character = online.load("logistic")
+    for k in range(150):
+        measurement["time"] = 0.02*k
+        switches["boots_tail"] = float(60 <= k < 70)
+        online.step(memory, severity, estimate, measurement, switches, published_clean(), character, 0.02)
+    assert np.isfinite(memory.watch["due"][0]).tolist() == [False, False, True, False]
 
 
 def test_a_nan_in_a_measurement_changes_nothing_for_good():

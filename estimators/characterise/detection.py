@@ -64,18 +64,17 @@ def detect(watch: NDArray[np.void], score: FloatArray, gust: FloatArray, tempera
     watch["detected"] = np.where(new, 1.0, np.where(watch["below"] >= tuning.release, 0.0, watch["detected"]))
 
 
-def inflations(watch: NDArray[np.void], switches: FloatArray, now: FloatArray, judged: Judgement,
+def inflations(watch: NDArray[np.void], on: NDArray[np.bool_], now: FloatArray, judged: Judgement,
                tuning: Tuning) -> NDArray[np.bool_]:
     """Note the inflations of now, with the severity before them, in place.
 
     Args:
-        switches: 0/1 of each of PARTS [n, 4].
+        on: whether the switch of each of PARTS was on since the last judgement [n, 4].
         judged: the last judgement before now.
 
     Returns:
         Which inflate [n, 4].
     """
-    on = switches > 0.5
     held = now[:, None] - watch["inflated"] >= tuning.boot_cycle - 1e-6
     fires = on & ((watch["was"] < 0.5) | held)
     watch["was"] = np.where(on, 1.0, 0.0)

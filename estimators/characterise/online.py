@@ -46,13 +46,17 @@ class Character:
 
 @dataclass
 class Memory:
-    """What is remembered of `n` aircraft: evidence and watch rows, own clean offsets, the last judgement, a clock."""
+    """What is remembered of `n` aircraft: evidence and watch rows, own clean offsets, the last judgement, a clock.
+
+    `on`: switches of PARTS that were on at any sample since then [n, 4].
+    """
 
     evidence: NDArray[np.void]
     watch: NDArray[np.void]
     offset: FloatArray
     referenced: NDArray[np.bool_]
     judged: Judgement
+    on: NDArray[np.bool_]
     clock: float = 0.0
 
 
@@ -67,7 +71,8 @@ def init(n: int) -> tuple[Memory, NDArray[np.void]]:
                       np.ones((n, len(PARTS))))
     severity = np.zeros(n, SEVERITY)
     severity["onset"], severity["p_clean"] = np.nan, 1.0
-    return Memory(evidence_of.init(n), detection.init(n), np.zeros((n, OFFSET)), np.zeros(n, bool), blank), severity
+    return Memory(evidence_of.init(n), detection.init(n), np.zeros((n, OFFSET)), np.zeros(n, bool), blank,
+                  np.zeros((n, len(PARTS)), bool)), severity
 
 
 def refer(memory: Memory, reference: FloatArray, rows: slice | NDArray = slice(None)) -> None:
@@ -90,13 +95,15 @@ def step(memory: Memory, severity: NDArray[np.void], estimate: NDArray[Any], mea
     """
     tuning = character.tuning
     evidence_of.step(memory.evidence, measurement, clean, dt, tuning.memory, tuning.shift_memory)
+    for i, name in enumerate(SWITCHES):
+        memory.on[:, i] |= switches[name] > 0.5
     memory.clock += dt
     if memory.clock < tuning.period - 0.5*dt:
         return
     memory.clock -= tuning.period
     now = np.asarray(measurement["time"], np.float64)
-    on = np.stack([np.asarray(switches[name], np.float64) for name in SWITCHES], axis=1)
-    fires = detection.inflations(memory.watch, on, now, memory.judged, tuning)
+    fires = detection.inflations(memory.watch, memory.on, now, memory.judged, tuning)
+    memory.on[:] = False
     restart(memory.evidence, np.asarray(fires.any(axis=1)))
     _judge(memory, severity, estimate, clean, character, now)
 
