@@ -1,8 +1,11 @@
 """Extended Kalman filter for states and parameters together; its vectors and dynamics: estimators.recursive.joint.
 
 Prediction by Heun's rule with the inputs of the last sample and of this one; its Jacobian by states from differences,
-by parameters the rows themselves. Unlike the H-infinity observer it trusts its noise statistics: where d and n are not
-those of the flight, so are its gain and its covariance (Ding et al., Acta Aerodyn. Sinica, 2016).
+by parameters the rows themselves. Products of an error of state with one of a parameter, which a first-order filter
+takes for certain, add their variance P_xx row_x' P_theta row_x to xdot and to what the accelerometers should show, as
+in the second-order filter (Jazwinski 1970, section 9.3): without it the first noise of a manoeuvre, met with parameters
+known to a factor of two, throws them far off. Unlike the H-infinity observer it trusts its noise statistics: where d
+and n are not those of the flight, neither are its gain and its covariance (Ding et al., Acta Aerodyn. Sinica, 2016).
 """
 
 from __future__ import annotations
@@ -87,13 +90,14 @@ def spread(ob: Any, tn: Any, p: Any, axis: int, dt: float) -> None:
             p[j, k] = p[k, j]
         for j in range(3, size):
             p[k, j], p[j, k] = wide[k, j], wide[k, j]
-        p[k, k] += tn["d"][3 * axis + k] ** 2 * dt
+        c = 3 * axis + k
+        p[k, k] += tn["d"][c] ** 2 * dt + ob["curve"][c, 0] * dt * dt
     wander(ob, tn, p, axis, dt)
 
 
 @block
-def differentiate(ob: Any, m: Any, af: Any, axis: int, alpha: float, beta: float) -> None:
-    """ob["jacobian"] of the channels and ob["wide"][:, :3] of the accelerometers' h by states; `at` is moved.
+def differentiate(ob: Any, m: Any, af: Any, p: Any, axis: int, alpha: float, beta: float) -> None:
+    """ob["jacobian"] of the channels, ob["wide"][:, :3] of the accelerometers' h by states, ob["curve"]; moves `at`.
 
     h = factor (row'theta - felt) is what an accelerometer is expected to differ by from what it shows. On return
     ob["wide"][k, 3] is h of channel k's accelerometer, ob["row_kept"] the row and ob["cross"][k] the factor.
@@ -102,6 +106,7 @@ def differentiate(ob: Any, m: Any, af: Any, axis: int, alpha: float, beta: float
     for k in range(3):
         c = a + k
         ob["slope"][k] = at["rest"][c] + product(at["row"], theta, c)
+        ob["curve"][c, 0], ob["curve"][c, 1] = 0.0, 0.0
         if ACCELEROMETER[c] >= 0:
             ob["cross"][k] = at["factor"][ACCELEROMETER[c]]
             ob["wide"][k, 3] = ob["cross"][k] * (product(at["row"], theta, c) - at["felt"][ACCELEROMETER[c]])
@@ -118,6 +123,24 @@ def differentiate(ob: Any, m: Any, af: Any, axis: int, alpha: float, beta: float
                 g = ACCELEROMETER[c]
                 h = at["factor"][g] * (product(at["row"], theta, c) - at["felt"][g])
                 ob["wide"][k, i] = (h - ob["wide"][k, 3]) / step
+        bend(ob, p, axis, i, step)
+
+
+@block
+def bend(ob: Any, p: Any, axis: int, i: int, step: float) -> None:
+    """Add state i's share to ob["curve"], from the rows in ob["at"], `step` away from those kept."""
+    at, b = ob["at"], OFFSET[axis] - 3
+    for k in range(3):
+        c = 3 * axis + k
+        total = 0.0
+        for j in range(FIRST[c], FIRST[c] + COUNT[c]):
+            for n in range(FIRST[c], FIRST[c] + COUNT[c]):
+                change = (at["row"][j] - ob["row_kept"][j]) * (at["row"][n] - ob["row_kept"][n])
+                total += change * p[j - b, n - b]
+        total *= p[i, i] / (step * step)
+        ob["curve"][c, 0] += total
+        if ACCELEROMETER[c] >= 0:
+            ob["curve"][c, 1] += ob["cross"][k] * ob["cross"][k] * total
 
 
 @block
@@ -137,7 +160,7 @@ def feel(ob: Any, tn: Any, p: Any, axis: int, dt: float) -> None:
         h = ob["wide"][k, 3] + factors[k] * (product(ob["row_kept"], theta, c) - ob["slope"][k])
         for i in range(3):
             h += ob["wide"][k, i] * moved[i]
-        strength = tn["accelerometer"][g] ** 2 / dt
+        strength = tn["accelerometer"][g] ** 2 / dt + ob["curve"][c, 1]
         for j in range(size):
             total = 0.0
             for i in range(3):
@@ -156,7 +179,7 @@ def feel(ob: Any, tn: Any, p: Any, axis: int, dt: float) -> None:
 def advance(ob: Any, m: Any, af: Any, tn: Any, p: Any, axis: int, alpha: float, beta: float, dt: float) -> None:
     """One vector over one sample: predict, feel, read."""
     predict(ob, m, af, tn, p, axis, alpha, beta, dt)
-    differentiate(ob, m, af, axis, alpha, beta)
+    differentiate(ob, m, af, p, axis, alpha, beta)
     feel(ob, tn, p, axis, dt)
     read_states(ob, tn, p, axis, dt)
 
