@@ -44,9 +44,10 @@ def check(record: FlightRecord) -> FlightRecord:
     _check_units(record)
     record = _without_constants(record)
     record = _without_frozen(_without_spikes(record))
-    check_kinematics(record)
+    grid = common_grid(record)
+    check_kinematics(grid, f"record '{record.meta.name}'")
     known = set(record.problems)
-    return record.with_problems(p for p in common_grid(record).problems if p not in known)
+    return record.with_problems(p for p in grid.problems if p not in known)
 
 
 def _increasing(record: FlightRecord) -> FlightRecord:

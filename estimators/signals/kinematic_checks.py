@@ -15,23 +15,21 @@ from numpy.typing import NDArray
 from estimators.signals.consistency import FEWEST, line
 from estimators.signals.differentiate import half_width, slope, smooth
 from estimators.signals.flow_checks import REACH, check_flow
-from estimators.signals.resample import Grid, common_grid
+from estimators.signals.resample import Grid
 from icing_env.atmosphere import G0
 from icing_env.errors import InputError
-from icing_env.record import FlightRecord, FloatArray
+from icing_env.record import FloatArray
 
 DRIFT = 2.0  # m/s by which the axial acceleration must miss the airspeed before it is doubted
 LONGEST = 120.0  # s over which accelerations can be summed up: a small bias strays far over more
 
 
-def check_kinematics(record: FlightRecord) -> None:
-    """Refuse a record whose channels contradict each other.
+def check_kinematics(grid: Grid, where: str) -> None:
+    """Refuse a record whose channels contradict each other; `where` begins the message.
 
     Raises:
         InputError: names the channel and what it looks like.
     """
-    grid = common_grid(record)
-    where = f"record '{record.meta.name}'"
     zero = np.zeros(len(grid.time))
     v = {name: grid.values.get(name, zero) for name in ("phi", "theta", "p", "q", "r")}
     has = grid.values.__contains__
