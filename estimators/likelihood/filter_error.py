@@ -22,7 +22,7 @@ from estimators.likelihood.equations import FIRST_GUST, STATES, VANE
 from estimators.likelihood.inputs import OUTPUTS, flown, white_noise
 from estimators.likelihood.model import COUNT, NAMES, Model, model, quasi_steady
 from estimators.likelihood.newton import Point, descend
-from estimators.likelihood.output_error import FEW, MOST, axes, r_squared, starting_values
+from estimators.likelihood.output_error import FEW, MOST, axes, best_flight, r_squared, starting_values
 from estimators.likelihood.report import Found, estimates
 from estimators.likelihood.simulate import filtered_flight
 from estimators.regression.equations import EXCITED, SURFACES, movement
@@ -35,19 +35,25 @@ from icing_env.record import FlightRecord, FloatArray
 METHOD = "filter error"
 # Standard deviations of the first state: m/s across, rad/s, rad. Within what the first samples tell of it (assumed).
 SPREAD = {"longitudinal": (1.0, 0.02, 0.01, 0.01), "lateral": (1.0, 0.02, 0.02, 0.01)}
-# Start: m/s, rad2/s3, m2/s3. The last stands for what a gust along the path does to the lift, of which the airspeed
-# tells only the slow part (assumed).
-GUST, DRIVE, ACROSS = 0.3, 1e-5, 1e-3
+GUST, DRIVE = 0.3, 1e-5  # start: m/s, rad2/s3 (assumed)
+# Unmodelled acceleration across (m2/s3) over the gust's variance: a gust along the path changes the lift by 2 g u/V,
+# of which the smoothed airspeed tells the slow part; here Dryden's spectrum of it at 2 rad/s, 72 m/s. And what there
+# always is (assumed).
+ALONG, ACROSS = {"longitudinal": 0.005, "lateral": 0.0}, 1e-6
 # What is known beforehand, as standard deviations about zero or the start: in turbulence the kinematics no longer tell
 # an error of the vane from a gust, and in calm air the record does not show the gust's intensity (assumed).
+# Least standard deviation of what is measured, in the order of the outputs: rad, rad/s, m/s2 (assumed: a twentieth of
+# what the instruments of the simulation have, so that records smoothed by their owner do not count as exact).
+RESOLUTION = {"longitudinal": (1e-4, 1e-4, 1e-4, 0.003, 0.003), "lateral": (1e-4, 1e-4, 1e-4, 1e-4, 0.003)}
 WIDE = 3.0  # of the logarithm of an intensity
 KNOWN = {"scale": 0.03, "lag": 0.03, "az": 0.1, "ay": 0.1, "lift": 0.3}  # by the last word of a name: 1, s, m/s2, 1
-# What the model of the gust leaves unexplained in the pitching moment, as a share of each derivative: the mean error over
-# simulated flights in turbulence (the development flights of testbed.coverage), whose cause is not known. It enters the
-# standard error in so far as the gust exceeds FELT, m/s.
+# What the model of the gust leaves unexplained in the pitching moment, as a share of each derivative: the mean error
+# over simulated flights in turbulence (development flights of testbed.coverage), whose cause is not known. It enters
+# the standard error in so far as the gust exceeds FELT, m/s.
 MISFIT = {"CZ_alpha": 0.015, "CZ_q": 0.05, "CZ_elevator": 0.04, "Cm_alpha": 0.05, "Cm_q": 0.03, "Cm_elevator": 0.017}
 FELT = 0.15
-LOG_STEP, LARGEST_LOG, WIDENED = 0.05, 1.0, 4.0
+LOG_STEP, LARGEST_LOG, WIDENED, FIRST_STEPS = 0.05, 1.0, 4.0, 10
+NEAR = 0.3  # standard errors that may be left to go: intensities that a record hardly shows are found slowly
 
 
 def identify(record: FlightRecord, start: float | None = None, default: Airframe | None = None) -> dict[str, Estimate]:
@@ -67,24 +73,33 @@ def identify(record: FlightRecord, start: float | None = None, default: Airframe
     for axis in axes(grid, record.meta.name):
         flight = flown(grid, airframe, axis)
         starts = tuple(n for n in ("start_w", "start_q", "start_theta", "start_v", "start_p", "start_r", "start_phi"))
-        likelihood = begin(model(flight, first, starts, gusts=True), grid)
+        likelihood = begin(model(flight, first, starts, gusts=True), model(flight, first), grid)
         moved = any(movement(grid.time, grid.values[n], grid.good((n,))) >= EXCITED for n in SURFACES[axis])
         result.update(estimates(likelihood.found(MOST if moved else FEW), grid, METHOD))
     return result
 
 
-def begin(plan: Model, grid: Grid) -> Likelihood:
-    """The likelihood of `plan`, with noise as the second differences of the channels show it, widened."""
+def begin(plan: Model, free: Model, grid: Grid) -> Likelihood:
+    """The likelihood of `plan` at the likelier of two starts.
+
+    One is where the plan stands, with noise as the second differences of the channels show it, widened; the other where
+    a few steps of output error on `free` lead, with what they leave over as noise, which is better in calm air.
+    """
     flight, names = plan.flown, OUTPUTS[plan.flown.axis]
-    share = WIDENED / flight.thin
     there = [name for name, column in zip(names, flight.measured.T, strict=True) if np.isfinite(column).any()]
-    noise = [max(white_noise(grid.values[name]) * share, 1e-12) for name in there]
-    return Likelihood(plan, np.concatenate((plan.theta0, np.log([GUST, DRIVE, ACROSS, *noise]))))
+    noise = [max(white_noise(grid.values[name]) * WIDENED / flight.thin, 1e-12) for name in there]
+    starts = [Likelihood(plan, np.concatenate((plan.theta0, np.log([GUST, DRIVE, *noise]))))]
+    best, _ = best_flight(free, FIRST_STEPS)
+    values = dict(zip(free.free_names, best.theta, strict=True))
+    theta = np.array([values.get(name, value) if name[0] == "C" else value
+                      for name, value in zip(plan.free_names, plan.theta0, strict=True)])  # fmt: skip
+    starts.append(Likelihood(plan, np.concatenate((theta, np.log([GUST, DRIVE, *best.noise])))))
+    return min(starts, key=lambda start: float(start.costs(start.start[None])[0]))
 
 
 @dataclass(frozen=True)
 class Likelihood:
-    """Of a model's free parameters, then the logarithms of gust intensity, both drives and noise variances.
+    """Of a model's free parameters, then the logarithms of gust intensity, drive and noise variances.
 
     `start` (p,): where the search begins, and about which the intensities are known beforehand.
     """
@@ -102,8 +117,9 @@ class Likelihood:
         flight, p, count = self.plan.flown, len(self.plan.free), len(NAMES[self.plan.flown.axis])
         whole, logs = self.plan.spread(thetas[:, :p])[:, :count], np.exp(np.clip(thetas[:, p:], -40.0, 20.0))
         noises, drives = np.ones((len(thetas), flight.measured.shape[1])), np.empty((len(thetas), 3))
-        noises[:, self.there] = logs[:, 3:]
-        drives[:, 0], drives[:, 1], drives[:, 2] = logs[:, 0], logs[:, 2], logs[:, 1]
+        noises[:, self.there] = logs[:, 2:] + np.square(RESOLUTION[flight.axis])[self.there]
+        drives[:, 0], drives[:, 2] = logs[:, 0], logs[:, 1]
+        drives[:, 1] = ALONG[flight.axis] * logs[:, 0] ** 2 + ACROSS
         first, spread = np.zeros(STATES), np.zeros(STATES)
         first[: COUNT[flight.axis]], spread[:FIRST_GUST] = flight.start, SPREAD[flight.axis]
         first[VANE], spread[VANE] = flight.measured[np.isfinite(flight.measured[:, 0]), 0][0], SPREAD[flight.axis][-1]
@@ -116,7 +132,7 @@ class Likelihood:
     def spread(self) -> FloatArray:
         """Standard deviations of what is known beforehand; infinite for the derivatives."""
         of = [KNOWN.get(name.split("_")[-1], np.inf) if name[0] != "C" else np.inf for name in self.plan.free_names]
-        return np.array([*of, *[WIDE] * (3 + len(self.there))])
+        return np.array([*of, *[WIDE] * (2 + len(self.there))])
 
     def _prior(self, thetas: FloatArray) -> FloatArray:
         """Distance from what is known beforehand in its standard deviations, shaped as `thetas`."""
@@ -151,7 +167,7 @@ class Likelihood:
         """The fit in at most so many steps."""
         plan, q, start = self.plan, len(self.plan.free), self.start
         limit = np.where(np.arange(len(start)) < q, np.inf, LARGEST_LOG)
-        end = descend(self, start, None, most, limit)
+        end = descend(self, start, None, most, limit, NEAR)
         theta, covariance = quasi_steady(plan, end.theta[:q], end.inverse[:q, :q])
         gust = float(np.exp(end.theta[q]))
         names = (*plan.free_names, f"sigma_gust_{'w' if plan.flown.axis == 'longitudinal' else 'v'}")

@@ -6,8 +6,8 @@ parameters is the mean square of the residual, so that the cost J = 1/2 sum v'R^
 Sensitivities S = dy/dtheta are central differences, all in one batched call; g = sum S'R^-1 v, M = sum S'R^-1 S,
 dtheta = M^-1 g. Source: Klein & Morelli, Aircraft System Identification (AIAA 2006), chapter 6; Jategaonkar, Flight
 Vehicle System Identification (AIAA 2006), chapter 4. Converged means all criteria at once: |dtheta| below 1e-3 of
-theta (or 1e-5), |dJ/J| below 1e-3, |dR/R| below 0.05, and the gradient below 0.05, here measured as the length of the
-remaining step in standard errors, sqrt(g' M^-1 g), so that no unit enters (assumed).
+theta (or 1e-5, or 0.05 standard errors), |dJ/J| below 1e-3, |dR/R| below 0.05, and the gradient below 0.05, here
+measured as the length of the remaining step in standard errors, sqrt(g' M^-1 g), so that no unit enters (assumed).
 """
 
 from __future__ import annotations
@@ -149,11 +149,17 @@ class Descent:
 
 
 def descend(
-    problem: Problem, theta: FloatArray, step: FloatArray | None, most: int, limit: FloatArray | None = None
+    problem: Problem,
+    theta: FloatArray,
+    step: FloatArray | None,
+    most: int,
+    limit: FloatArray | None = None,
+    near: float = GRADIENT,
 ) -> Descent:
     """Gauss-Newton with halved steps from `theta` (p,), until all criteria hold at once or `most` steps are done.
 
-    `limit` (p,) bounds the change of each parameter in one step.
+    `limit` (p,) bounds the change of each parameter in one step; `near` is how long the remaining step may be, in
+    standard errors.
     """
     reason, converged, change, iterations = f"no convergence in {most} steps", False, np.inf, 0
     last, last_noise = np.inf, np.ones(1)
@@ -164,7 +170,7 @@ def descend(
         farthest = move if limit is None else np.clip(move, -limit, limit)
         left = max(float(point.gradient @ move), 0.0) ** 0.5
         settled = float(np.max(np.abs(point.noise - last_noise) / point.noise)) < NOISE_CHANGE
-        if change < 1.0 and abs(point.cost - last) < COST_CHANGE * abs(point.cost) and settled and left < GRADIENT:
+        if change < 1.0 and abs(point.cost - last) < COST_CHANGE * abs(point.cost) and settled and left < near:
             converged, reason = True, f"converged in {iterations} steps"
             break
         if iterations >= most:
@@ -172,10 +178,11 @@ def descend(
         taken = _shorten(problem, theta, farthest, point.cost)
         if taken is None:
             # Nothing along the step is better: at the bottom up to rounding, or stuck.
-            converged = left < GRADIENT
+            converged = left < near
             reason = f"converged in {iterations} steps" if converged else "stopped: no step reduces the cost"
             break
-        change = float(np.max(np.abs(taken - theta) / np.maximum(LARGEST_CHANGE * np.abs(theta), SMALLEST_CHANGE)))
+        least = np.maximum(SMALLEST_CHANGE, near * np.sqrt(np.maximum(np.diag(inverse), 0.0)))
+        change = float(np.max(np.abs(taken - theta) / np.maximum(LARGEST_CHANGE * np.abs(theta), least)))
         theta, last, last_noise, iterations = taken, point.cost, point.noise, iterations + 1
     if not full_rank:
         converged, reason = False, f"{reason}; some parameters cannot be told apart"

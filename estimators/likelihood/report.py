@@ -92,7 +92,8 @@ def _twins(found: Found) -> dict[str, str]:
     for i, name in enumerate(found.names):
         j = int(np.argmax(matrix[i]))
         both = all(n.split("_")[0] in OUTPUT_OF and not n.endswith("_0") for n in (name, found.names[j]))
-        if both and matrix[i, j] > ALIKE and "CX" not in name:
+        same = name.split("_")[0] == found.names[j].split("_")[0]
+        if both and same and matrix[i, j] > ALIKE and "CX" not in name:
             twins[name] = (f"{name} and {found.names[j]} are known together only "
                            f"(correlation of the estimates {matrix[i, j]:.3f})")  # fmt: skip
     return twins
