@@ -67,5 +67,5 @@ def pictures(seed: int) -> list[Picture]:
     if flown is None:
         return []
     figure = fit_histories(flown, {"elevator": pair[1]["elevator"]})
-    return [Picture(figure, "Prediction: record 017 flown with the derivatives that stepwise regression found in record "
-                    "018. Dashed, measured.", "Predicted and measured histories lie on one another")]
+    return [Picture(figure, "Prediction: record 017 flown with the derivatives that stepwise regression found in "
+                    "record 018. Dashed, measured.", "Predicted and measured histories lie on one another")]

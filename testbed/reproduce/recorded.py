@@ -9,13 +9,11 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from matplotlib.figure import Figure
-
 from estimators.estimate import Estimate
 from estimators.likelihood import output_error
 from estimators.methods import METHODS, method
 from icing_env.record import FlightRecord, read
-from testbed.plotting import derivative_dots
+from testbed.identify_figures import methods_compared
 from testbed.reproduce.pictures import Picture
 from testbed.reproduce.row import Row, Rule
 from testbed.textbook import BOOK, folder
@@ -57,6 +55,7 @@ def rows(seed: int) -> list[Row]:
     for name, record in records().items():
         for how, estimates in identified(name).items():
             technique = TECHNIQUE.get(how, TECHNIQUE["output_error"] if how == TEXTBOOK_MODEL else "equation error")
+            technique = printed_by(technique, name)
             book = printed(technique, name)
             found += [_row(record, how, technique, key, value, estimates) for key, value in book.items()
                       if key in estimates]
@@ -68,9 +67,14 @@ def records() -> dict[str, FlightRecord]:
     return {name: read(folder()/name) for name in NAMES if (folder()/name).is_file()}
 
 
+def printed_by(technique: str, name: str) -> str:
+    """The technique, or the same in the time domain where the textbook prints nothing of the record in frequency."""
+    return technique if name in PRINTED[technique] else technique.removeprefix("frequency, ")
+
+
 def printed(technique: str, name: str) -> dict[str, float]:
-    """What the textbook prints of a record by a technique; of equation error where it has nothing by that."""
-    values = PRINTED[technique].get(name) or PRINTED["equation error"][name]
+    """What the textbook prints of a record by a technique."""
+    values = PRINTED[printed_by(technique, name)][name]
     return {key: value for key, value in zip(NAMES[name], values, strict=True) if value is not None}
 
 
@@ -108,10 +112,7 @@ def pictures(seed: int) -> list[Picture]:
         series = {how: {key: (e.estimate, e.std_error) for key, e in estimates.items()
                         if e.identifiable and key in NAMES[name]} for how, estimates in identified(name).items()}
         reference = {key: value for key, value in printed("equation error", name).items() if key != "Cn_aileron"}
-        figure: Figure = derivative_dots({how: s for how, s in series.items() if s}, reference,
-                                         reference_label="textbook, equation error")
-        figure.set_size_inches(9.2, 1.6 + 0.62*len(reference))
-        found.append(Picture(figure, f"Every method on {record.meta.name}: derivatives as a share of what the textbook "
-                             "prints for equation error, with 95 % intervals.",
-                             "Dots of all methods near one for most derivatives"))
+        figure = methods_compared({how: s for how, s in series.items() if s}, list(reference), reference)
+        found.append(Picture(figure, f"Every method on {record.meta.name} with its 95 % interval; dashed, what the "
+                             "textbook prints for equation error.", "Methods beside one another for each derivative"))
     return found
