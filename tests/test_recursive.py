@@ -245,3 +245,14 @@ def test_it_can_be_the_observer_in_the_loop(name: str) -> None:
     assert estimate["Cm_elevator"][0] == pytest.approx(truth()["Cm_elevator"], rel=0.1)
     with pytest.raises(InputError, match="unknown"):
         World(flown, 1, loop_factory(estimator="no"), mode=None)
+
+
+@pytest.mark.parametrize("name", ["hinf", *RIVALS])
+def test_far_starts_end_together_behind_noisy_instruments(name: str) -> None:
+    """From 0.4 and 1.6 of the truth with 0.1 deg of noise: within a few per cent of one another."""
+    m = noisy_flights(4)
+    low, high = (run(name, m, start)[0][-1] for start in (0.4, 1.6))
+    assert low["health"].all() and high["health"].all()
+    for parameter in ("CL_alpha", "Cm_alpha", "Cm_elevator", "Cl_p", "Cn_beta"):
+        spread = np.abs(high[parameter] - low[parameter]) / abs(truth()[parameter])
+        assert np.all(spread < 0.06), (parameter, spread)
