@@ -56,8 +56,9 @@ def test_seven_starts_end_together() -> None:
         assert np.ptp(values[:, -1]) < 0.03 * np.ptp(values[:, 0]), name
 
 
-def doublets(seed: int, airspeed: float) -> FlightRecord:
+def doublets(seed: int, airspeed: float, **changes: float) -> FlightRecord:
     flown = scenario.load("clear_air", duration=36.0, initial={"airspeed": airspeed}, ice_protection="off",
+                          parameters=changes,
                           events=({"time": 10.0, "name": "doublets", "doublets": True},))  # fmt: skip
     return fly(flown, seed=seed, windows=[(5.0, 36.0)]).record
 
@@ -84,3 +85,9 @@ def test_no_convergence_is_refused_and_told() -> None:
     found = hinf_record.identify(record, tuning)
     assert not found["CL_alpha"].identifiable and "no convergence: from 0.4 and 1.6" in found["CL_alpha"].why
     assert found["Cm_alpha"].identifiable
+
+
+def test_turbulence_is_told() -> None:
+    """Gusts at the tail bias the moments beyond their standard errors: the estimate says that it may be so."""
+    calm, rough = (hinf_record.identify(doublets(2, 72.0, turbulence_sigma_w=s)) for s in (0.0, 2.0))
+    assert not calm["Cm_q"].warning and "turbulence of about" in rough["Cm_q"].warning

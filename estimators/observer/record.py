@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from estimators.regression.equations import EXCITED, LARGEST_RATIO, SURFACES, mo
 from estimators.regression.least_squares import Fit, least_squares
 from estimators.signals.coefficients import thrust
 from estimators.signals.data_checks import check
+from estimators.signals.gust_level import turbulence_warnings
 from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
@@ -123,12 +124,13 @@ def identify(
     The standard error is that of least squares on the rows that the observer learned from (behind its filter; the
     accelerometer's where there is one), corrected for coloured residuals: the scatter to be expected from what the
     record does not explain. It is not what the recursion holds for it, which rests on the tuning alone
-    (`History.parameter`). A parameter has converged if starts far apart end close together, and is refused if not.
+    (`History.parameter`). A record with gusts carries a warning. A parameter has converged if starts far apart end close
+    together, and is refused if not.
     """
     record = check(record)
     grid = common_grid(record)
     run, *far = (_to_the_last_good(h) for h in _run(method, grid, record, (start, *FAR), tuning, airframe))
-    lacks = absent(grid)
+    lacks, warnings = absent(grid), turbulence_warnings(grid, method.name)
     moved = {
         name: movement(grid.time, grid.values[name], grid.good((name,)))
         for pair in SURFACES.values() for name in pair if name in grid.values
@@ -143,11 +145,11 @@ def identify(
                 why = _why_not(name, channel, moved) or _why_not_converged(run, far, i, len(grid.time))
                 if not why and not name.endswith("_0") and not error <= LARGEST_RATIO * abs(value):
                     why = f"its standard error {error:.2g} exceeds a third of the estimate {value:.2g}"
-                result[name] = Estimate(value, error, unit_of(name), method.name, fit.r2, not why, why)
+                warning = warnings.get(AXIS[channel], "")
+                result[name] = Estimate(value, error, unit_of(name), method.name, fit.r2, not why, why, warning)
     if "CD_0" in result:
         why = _why_not_drag(grid, run)
-        drag = result["CD_0"]
-        result["CD_0"] = Estimate(drag.estimate, drag.std_error, "1", method.name, drag.r2, not why, why)
+        result["CD_0"] = replace(result["CD_0"], identifiable=not why, why=why)
     return result
 
 
