@@ -29,7 +29,7 @@ class Size:
     protected: int  # aircraft with boots
 
 
-FULL = Size(300, 24, 900.0, 100.0, 48)
+FULL = Size(300, 24, 900.0, 300.0, 48)
 QUICK = Size(100, 12, 600.0, 4.0, 24)
 
 
