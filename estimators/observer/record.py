@@ -124,8 +124,8 @@ def identify(
     The standard error is that of least squares on the rows that the observer learned from (behind its filter; the
     accelerometer's where there is one), corrected for coloured residuals: the scatter to be expected from what the
     record does not explain. It is not what the recursion holds for it, which rests on the tuning alone
-    (`History.parameter`). A record with gusts carries a warning. A parameter has converged if starts far apart end close
-    together, and is refused if not.
+    (`History.parameter`). A record with gusts carries a warning. A parameter has converged if starts far apart end
+    close together, and is refused if not.
     """
     record = check(record)
     grid = common_grid(record)
