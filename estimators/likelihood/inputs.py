@@ -19,9 +19,9 @@ from estimators.signals.differentiate import low_pass
 from estimators.signals.resample import Grid
 from icing_env.atmosphere import G0
 from icing_env.record import FloatArray
-from icing_env.turbulence import scales
 
 AIRSPEED_WINDOW = 1.0  # s: parabola through which the airspeed passes; its noise would else shake the forces (assumed)
+FOOT = 0.3048  # m, exact
 HIGH = 1000.0  # m above ground where no altitude was recorded: turbulence is isotropic from 610 m
 CUTOFF = 5.0  # Hz: nothing of the rigid aircraft is faster, and noise on a control weakens its derivatives (assumed)
 FAST = ("alpha", "beta", "p", "q", "r", "phi", "theta", "ax", "ay", "az", "elevator", "aileron", "rudder")
@@ -96,6 +96,18 @@ def flown(grid: Grid, airframe: Airframe, axis: str, smooth: bool = True) -> Flo
     return Flown(axis, grid.dt, data, measured, inverse, start, float(np.mean(columns["airspeed"])), noise, thin)
 
 
+def scale_lengths(altitude: float) -> tuple[float, float]:
+    """Scale lengths (m) of side and vertical gusts at a height (m) above ground.
+
+    MIL-F-8785C, 3.7.2: the low-altitude model up to 1000 ft, 1750 ft from 2000 ft, straight lines between.
+    """
+    height = min(max(altitude / FOOT, 10.0), 1000.0)
+    low = (height / (0.177 + 0.000823 * height) ** 1.2, height)
+    share = min(max(altitude / FOOT - 1000.0, 0.0), 1000.0) / 1000.0
+    across, down = (FOOT * (length + share * (1750.0 - length)) for length in low)
+    return across, down
+
+
 def white_noise(signal: FloatArray) -> float:
     """Variance of the noise on a signal (N,), from its second differences; their median sets quick moves aside."""
     second = np.abs(np.diff(signal, 2))
@@ -110,13 +122,13 @@ def _common(values: dict[str, FloatArray], dt: float, airframe: Airframe) -> dic
     qbar = dynamic_pressure(values) * (smooth / airspeed) ** 2
     force = qbar * airframe.geometry.wing_area
     altitude = float(np.mean(values["altitude"])) if "altitude" in values else HIGH
-    length = {name: scales(altitude)[i] for i, name in enumerate(("lateral", "longitudinal"))}
+    across, down = scale_lengths(altitude)
     return {
         "airspeed": smooth, "u": smooth * np.cos(alpha) * np.cos(beta), "v": smooth * np.sin(beta),
         "w": smooth * np.sin(alpha) * np.cos(beta), "qS": force,
         "force": force / values.get("mass", np.full(n, airframe.mass)),
-        "level": G0 * np.cos(theta) * np.cos(phi), "rate_w": smooth / length["longitudinal"],
-        "rate_v": smooth / length["lateral"], "delay_rate": 2.0 * smooth / (TAIL_CHORDS * airframe.geometry.chord),
+        "level": G0 * np.cos(theta) * np.cos(phi), "rate_w": smooth / down,
+        "rate_v": smooth / across, "delay_rate": 2.0 * smooth / (TAIL_CHORDS * airframe.geometry.chord),
     }  # fmt: skip
 
 
