@@ -10,7 +10,9 @@ from flights import LATERAL, META, RHO, G, V, doublet, flight_data, lateral
 from scipy.integrate import solve_ivp
 
 from estimators.likelihood import filter_error, output_error
+from estimators.likelihood.inputs import scale_lengths
 from icing_env.record import FlightRecord, read
+from icing_env.turbulence import scales
 from testbed.coverage import DEVELOPMENT, study
 
 NOISE = {"beta": 0.0017, "p": 0.0017, "r": 0.0017, "phi": 0.0017, "ay": 0.05}
@@ -102,6 +104,11 @@ def test_gaps_are_flown_through() -> None:
     found = filter_error.identify(replace(record, channels={**record.channels, "r": r}))
     assert found["Cn_r"].identifiable
     assert abs(found["Cn_r"].estimate - LATERAL["Cn_r"]) < 4.0 * found["Cn_r"].std_error
+
+
+@pytest.mark.parametrize("altitude", [2.0, 50.0, 304.8, 450.0, 700.0, 2200.0])
+def test_scale_lengths_are_those_of_the_standard(altitude: float) -> None:
+    assert scale_lengths(altitude) == pytest.approx(scales(altitude)[:2])
 
 
 @pytest.mark.slow
