@@ -13,7 +13,8 @@ import numpy as np
 
 from estimators.compatibility.kinematics import COUNT, INPUTS, PARAMETERS, START
 from estimators.compatibility.model import ORDER, PLAUSIBLE, Model
-from estimators.likelihood.newton import MaximumLikelihood, inverse_information
+from estimators.likelihood.descent import inverse_information
+from estimators.likelihood.newton import MaximumLikelihood
 from icing_env.record import FloatArray
 
 LARGEST_CORRELATION = 0.9

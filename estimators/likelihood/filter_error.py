@@ -18,10 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimators.estimate import Estimate
+from estimators.likelihood.descent import Point, descend
 from estimators.likelihood.equations import FIRST_GUST, STATES, VANE
 from estimators.likelihood.inputs import OUTPUTS, flown, white_noise
 from estimators.likelihood.model import COUNT, NAMES, Model, model, quasi_steady
-from estimators.likelihood.newton import Point, descend
 from estimators.likelihood.output_error import FEW, MOST, axes, best_flight, r_squared, starting_values
 from estimators.likelihood.report import Found, estimates
 from estimators.likelihood.simulate import filtered_flight
