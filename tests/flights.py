@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -107,3 +108,8 @@ def _noisy(channels: dict[str, np.ndarray], seed: int | None) -> dict[str, np.nd
         return channels
     rng = np.random.default_rng(seed)
     return {k: v + NOISE[k] * rng.standard_normal(len(v)) if k in NOISE else v for k, v in channels.items()}
+
+
+def with_channel(record: FlightRecord, name: str, values: np.ndarray) -> FlightRecord:
+    """The record with one channel replaced."""
+    return replace(record, channels={**record.channels, name: values})

@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from flights import PITCH, flight_data, lateral, longitudinal
+from flights import PITCH, flight_data, lateral, longitudinal, with_channel
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimators.regression.equation_error import identify
 from estimators.signals.data_checks import check
-from icing_env import scenario as scenarios
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, read, write
-from testbed.flight import fly
-
-
-def with_channel(record: FlightRecord, name: str, values: np.ndarray) -> FlightRecord:
-    """The record with one channel replaced."""
-    return replace(record, channels={**record.channels, name: values})
 
 
 @pytest.mark.parametrize(
@@ -170,87 +162,6 @@ def test_too_short_is_refused() -> None:
         identify(longitudinal().take(slice(0, 3)))
     with pytest.raises(InputError, match="0 samples"):
         check(longitudinal().take(slice(0, 0)))
-
-
-@pytest.mark.parametrize(
-    ("name", "factor", "message"),
-    [
-        ("q", -1.0, "'q' .* has its sign reversed"),
-        ("theta", -1.0, "has its sign reversed"),
-        ("alpha", -1.0, "'alpha' has its sign reversed: lift falls as alpha rises"),
-        ("az", -1.0, "'az' has its sign reversed"),
-        ("az", 1 / 9.80665, "'az' looks like g"),
-        ("alpha", 57.29578, "looks like degrees"),
-        ("q", 57.29578, "degrees|not both in rad"),
-        ("temperature", 0.03, "looks like Celsius"),
-        ("pressure", 0.01, "looks like hPa"),
-    ],
-)
-def test_wrong_signs_and_units_are_refused(name: str, factor: float, message: str) -> None:
-    record = longitudinal(7)
-    with pytest.raises(InputError, match=message):
-        check(with_channel(record, name, record[name] * factor))
-
-
-@pytest.mark.parametrize(("name", "message"), [("p", "sign reversed"), ("phi", "sign reversed")])
-def test_reversed_roll_is_refused(name: str, message: str) -> None:
-    record = lateral(8)
-    with pytest.raises(InputError, match=message):
-        check(with_channel(record, name, -record[name]))
-
-
-@pytest.mark.parametrize("name", ["q", "alpha"])
-def test_reversed_sign_in_a_recorded_flight_is_refused(name: str) -> None:
-    record = read(flight_data("totter_demo_data.mat"))
-    with pytest.raises(InputError, match="sign reversed"):
-        check(with_channel(record, name, -record[name]))
-
-
-@cache
-def doublets(sigma: float, airspeed: float = 55.0) -> FlightRecord:
-    """A simulated set of doublets in all three axes, in turbulence."""
-    scenario = scenarios.load("clear_air", aircraft="twin_otter_flight", duration=57.0, doublet_scale=0.78,
-                              parameters={"turbulence_sigma_w": sigma}, initial={"airspeed": airspeed})  # fmt: skip
-    record = fly(scenario, seed=3, observer=False, protection=False).record
-    return record.take(record.time >= 5.0)
-
-
-@pytest.mark.parametrize("sigma", [0.0, 2.0])
-@pytest.mark.parametrize(
-    ("name", "factor", "message"),
-    [
-        ("alpha", -1.0, "'alpha' has its sign reversed"), ("beta", -1.0, "'beta'.? has its sign reversed"),
-        ("ay", -1.0, "'ay' .*has its sign reversed"), ("r", -1.0, "'r' .*has its sign reversed"),
-        ("psi", -1.0, "'psi'.? has its sign reversed"), ("ax", -1.0, "'ax' has its sign reversed"),
-        ("elevator", -1.0, "'elevator' has its sign reversed: a positive one raises q"),
-        ("aileron", -1.0, "'aileron' has its sign reversed"), ("rudder", -1.0, "'rudder' has its sign reversed"),
-        ("airspeed", 1.9438, "'airspeed' looks like knots"), ("airspeed", 3.2808, "'airspeed' looks like ft/s"),
-        ("ay", 1 / 9.80665, "'ay' looks like g"), ("r", 57.29578, "not both in rad|degrees per second"),
-        ("beta", 57.29578, "'beta' looks like degrees"),
-    ],
-)  # fmt: skip
-def test_the_motion_betrays_wrong_signs_and_units_in_turbulence_too(
-    name: str, factor: float, message: str, sigma: float
-) -> None:
-    record = doublets(sigma)
-    with pytest.raises(InputError, match=message):
-        check(with_channel(record, name, record[name] * factor))
-
-
-def test_without_ground_speed_the_turn_of_the_flow_betrays_the_unit_of_airspeed() -> None:
-    record = doublets(0.0)
-    alone = replace(record, channels={n: v for n, v in record.channels.items() if n != "ground_speed"})
-    with pytest.raises(InputError, match="'airspeed' looks like knots: az turns the flow"):
-        check(with_channel(alone, "airspeed", 1.9438 * record["airspeed"]))
-
-
-@pytest.mark.parametrize("sigma", [0.0, 1.0, 2.0, 4.0])
-@pytest.mark.parametrize("airspeed", [55.0, 72.0])
-def test_sound_records_in_turbulence_are_not_refused(sigma: float, airspeed: float) -> None:
-    record = doublets(sigma, airspeed)
-    check(record)
-    for start in (8.0, 28.0):
-        check(record.take((record.time >= start) & (record.time < start + 20.0)))
 
 
 FAULTS = ("constant", "gap", "spike", "reversed", "unit", "few", "nan run", "repeated", "frozen", "all missing")
