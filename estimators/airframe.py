@@ -34,8 +34,15 @@ OPTIONAL = ("CL_flap", "CD_flap", "Cm_flap", "induced_drag", "vane_lag", "boom_g
 
 def published_airframe(aircraft: str | Path = "twin_otter") -> np.ndarray:
     """The clean airframe as `configs/aircraft` states it, with the sources there (`AIRFRAME` array of one row)."""
-    sections = [entries for entries in read_toml("aircraft", aircraft).values() if isinstance(entries, dict)]
-    return airframe_from({name: entry["value"] for entries in sections for name, entry in entries.items()})
+    return airframe_from(_stated(aircraft))
+
+
+def _stated(aircraft: str | Path) -> dict[str, float]:
+    """Every number of an aircraft file; a file with `base = "..."` starts from that one."""
+    data = read_toml("aircraft", aircraft)
+    numbers = _stated(data["base"]) if "base" in data else {}
+    sections = [entries for entries in data.values() if isinstance(entries, dict)]
+    return numbers | {name: float(entry["value"]) for entries in sections for name, entry in entries.items()}
 
 
 def airframe_from(parameters: np.ndarray | Mapping[str, float]) -> np.ndarray:

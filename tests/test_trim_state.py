@@ -107,3 +107,8 @@ def test_bad_input_is_named() -> None:
     moving = record_of(m[60:], published_airframe())
     with pytest.raises(InputError, match="no reference record has a steady stretch"):
         trim_state.analyse(record(1), reference=[moving])
+
+
+def test_an_aircraft_file_that_starts_from_another_has_that_ones_numbers() -> None:
+    base, flight = published_airframe(), published_airframe("twin_otter_flight")
+    assert flight["span"][0] == base["span"][0] and flight["Cm_alpha"][0] != base["Cm_alpha"][0]
