@@ -81,23 +81,25 @@ class Pause(Listener):
 register("numba:compile", Pause())
 
 
+_begun: list[subprocess.Popen[bytes]] = []
+
+
 def compiles_beside() -> bool:
     """True in a process that `compile_beside` began: the plant is the other's to compile."""
     return BESIDE in os.environ
 
 
-@cache  # which also keeps the process from being thought forgotten
-def compile_beside(module: str) -> subprocess.Popen[bytes] | None:
+def compile_beside(module: str) -> None:
     """At a cold start, compile in a second process what this one will need after the plant: run `module` there.
 
     The processes meet in the cache. Whichever comes first to an entry compiles it; if the second fails, this one does
-    all of it.
+    all of it. Only the first call begins a process: the module that needs most calls first.
     """
     cold = not any(Path(cache_folder("icing_env")).rglob("*.nbi"))
-    if not cold or compiles_beside() or (os.cpu_count() or 1) < 2:
-        return None
-    return subprocess.Popen([sys.executable, "-m", module], env=os.environ | {BESIDE: "1"}, stdin=subprocess.DEVNULL,
-                            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    if not cold or _begun or compiles_beside() or (os.cpu_count() or 1) < 2:
+        return
+    _begun.append(subprocess.Popen([sys.executable, "-m", module], env=os.environ | {BESIDE: "1"},
+                                   stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
 
 
 class Building(CPUDispatcher):  # type: ignore[misc]
