@@ -15,6 +15,7 @@ from estimators.methods import METHODS, method
 from estimators.observer.choice import OBSERVERS, observer
 from estimators.observer.layout import ACCELEROMETER, COUNT, FIRST, PARAMETER_NAMES, clean_values
 from estimators.recursive import real_time_frequency, rls
+from estimators.recursive.spectra import FREQUENCIES
 from estimators.regression.equation_error import identify as equation_error
 from icing_env import scenario
 from icing_env.errors import InputError
@@ -178,7 +179,7 @@ def test_transforms_are_those_of_the_whole_record() -> None:
         for kept, field in ((rows, "row"), (y, "y"), (rest, "rest"), (felt, "felt")):
             kept.append(memory[field][0].copy())
     x, z, b, f = (np.array(kept) for kept in (rows, y, rest, felt))
-    frequency = 2.0 * np.pi * np.linspace(tuning["lowest"][0], tuning["highest"][0], real_time_frequency.FREQUENCIES)
+    frequency = 2.0 * np.pi * np.linspace(tuning["lowest"][0], tuning["highest"][0], FREQUENCIES)
     e = np.exp(-1j * frequency[:, None] * DT * (np.arange(len(m) - 1) + 0.5))
     mid = lambda s: 0.5 * DT * (s[1:] + s[:-1])  # noqa: E731
     sums = memory["re"][0] + 1j * memory["im"][0]
