@@ -252,6 +252,8 @@ ESTIMATE_FIELDS: list[Field] = [
     ("health", "0/1", "1 while the observer's matrices are positive definite and finite"),
 ]
 
+SENSED_PARTS = ("left_wing", "right_wing", "htail", "propeller")  # where ice, and failed protection, is told apart
+
 # What the ice management says to the crew, to the protection system and to whatever controller flies.
 ADVISORY_FIELDS: list[Field] = [
     ("severity", "1", "estimated icing severity, 0 clean, 1 severe"),
@@ -266,6 +268,16 @@ ADVISORY_FIELDS: list[Field] = [
     ("bank_limit", "rad", "largest bank allowed now"),
     ("flap_limit", "rad", "largest flap allowed now"),
     ("intervention", "rad", "size of the change the protection made to the elevator in this step"),
+    ("intervention_aileron", "rad", "the same for the aileron"),
+    ("load_factor_limit", "1", "largest normal load factor allowed now"),
+    ("pitch_limit", "rad", "highest pitch angle allowed now"),
+    *((f"severity_{part}", "1", f"estimated eta of the {part.replace('_', ' ')}") for part in SENSED_PARTS),
+    *((f"failed_{part}", "0/1", f"its ice protection is believed to have failed: {part}") for part in SENSED_PARTS),
+    ("tail_stall", "0/1", "the tailplane is near its stall: less flap, stick back"),
+    ("roll_upset", "0/1", "the roll is more than aileron explains: unload, roll level"),
+    ("power_lacking", "0/1", "speed or altitude asked for need more power than there is"),
+    ("adaptation", "0..1", "share of the adaptation of the control laws that is in force"),
+    ("adaptation_frozen", "0/1", "the estimate is too poor: the adaptation stays where it is"),
 ]
 ESTIMATE = structured(ESTIMATE_FIELDS)
 ADVISORY = structured(ADVISORY_FIELDS, ("memory", "f8"), ("since_detection", "f8"))

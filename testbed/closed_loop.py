@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers import autopilot, envelope_protection, ice_management
+from controllers import choice, ice_management
 from estimators.airframe import airframe_from
 from estimators.observer.choice import observer as observer_named
 from estimators.observer.layout import PARAMETER_NAMES
@@ -31,21 +31,26 @@ class ClosedLoop:
         protection: limit commands to the limits.
         boots: let the ice management switch boots and propeller heat.
         estimator: which observer, by its name in `estimators.observer.choice`.
+        law: who steers, by its name in `controllers.choice.LAWS`.
+        shield: how limits are kept, by its name in `controllers.choice.PROTECTIONS`.
     """
 
     def __init__(self, n: int, clean: NDArray, dt: float, *, observer: bool = True, management: bool = True,
-                 protection: bool = True, boots: bool = True, estimator: str = "hinf") -> None:
+                 protection: bool = True, boots: bool = True, estimator: str = "hinf", law: str = "autopilot",
+                 shield: str = "surfaces") -> None:
         self.dt, self.clean = dt, clean[:1].copy()
         self.observing, self.managing, self.protecting, self.boots = observer, management, protection, boots
         self.airframe = airframe_from(self.clean)
         chosen = observer_named(estimator)
-        self._step, self.tuning, self.gains = chosen.step, chosen.default_tuning(), autopilot.load_gains()
-        self.management_tuning, self.limits = ice_management.load_tuning(), envelope_protection.load_tuning()
+        self._step, self.tuning = chosen.step, chosen.default_tuning()
+        self._law, self._shield = choice.law(law), choice.protection(shield)
+        self.gains, self.shield_tuning = self._law.default_gains(), self._shield.load_tuning()
+        self.management_tuning = ice_management.load_tuning()
         self.target = np.zeros(n, TARGET)
         self._fresh_observer = chosen.init(self.airframe, self.tuning, 1)
         self._fresh_estimate = clean_estimate(self._fresh_observer)
         self.observer, self.estimate = np.repeat(self._fresh_observer, n), np.repeat(self._fresh_estimate, n)
-        self.advisory, self.autopilot = ice_management.init(n), autopilot.init(n)
+        self.advisory, self.law, self.shield = ice_management.init(n), self._law.init(n), self._shield.init(n)
 
     def attach(self, measurement: NDArray, command: NDArray) -> None:
         """Bind every part to the arrays it works on."""
@@ -57,13 +62,14 @@ class ClosedLoop:
         self._steer: Callable[[], None] | None = None  # compiled when first wanted: surfaces alone need no autopilot
         self._command = command
         self._operate = bound(ice_management.operate, command, advisory)
-        self._protect = bound(envelope_protection.protect, command, advisory, measurement, estimate, self.clean,
-                              self.limits, dt)
+        self._protect = bound(self._shield.protect, self.shield, command, advisory, measurement, estimate, self.clean,
+                              self.shield_tuning, dt)
 
     def reset(self, rows: NDArray) -> None:
         """Begin anew: a clean aircraft is believed, nothing is limited beyond the clean limits."""
         self.observer[rows], self.estimate[rows] = self._fresh_observer, self._fresh_estimate
-        self.advisory[rows], self.autopilot[rows] = ice_management.init(1), autopilot.init(1)
+        self.advisory[rows] = ice_management.init(1)
+        self.law[rows], self.shield[rows] = self._law.init(1), self._shield.init(1)
         if self.managing:
             advisory = self.advisory[rows]
             ice_management.step(advisory, self.estimate[rows], self.measurement[rows], self.clean,
@@ -80,8 +86,8 @@ class ClosedLoop:
     def steer(self) -> None:
         """Fly the targets."""
         if self._steer is None:
-            self._steer = bound(autopilot.step, self.autopilot, self._command, self.measurement, self.target,
-                                self.advisory, self.gains, self.dt)
+            self._steer = bound(self._law.step, self.law, self._command, self.measurement, self.estimate, self.target,
+                                self.advisory, self.clean, self.gains, self.dt)
         self._steer()
 
     def protect(self) -> None:
@@ -94,7 +100,7 @@ class ClosedLoop:
     def memory(self) -> dict[str, NDArray]:
         """Everything that must be kept to go on later."""
         return {"estimate": self.estimate, "advisory": self.advisory, "target": self.target,
-                "observer": self.observer, "autopilot": self.autopilot}
+                "observer": self.observer, "law": self.law, "shield": self.shield}
 
 
 def clean_estimate(memory: NDArray) -> NDArray:

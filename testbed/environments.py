@@ -12,33 +12,34 @@ from icing_env.loop import LoopFactory, NoLoop
 from icing_env.vector_env import TwinOtterVectorEnv
 from testbed.closed_loop import ClosedLoop
 
+PARTS = ("observer", "management", "protection", "boots")  # each on or off
+CHOICES = ("estimator", "law", "shield")  # each by name
 
-def loop_factory(observer: bool = True, management: bool = True, protection: bool = True,
-                 boots: bool = True, estimator: str = "hinf") -> LoopFactory:
-    """What closes the loop, by its parts; see `testbed.closed_loop.ClosedLoop`."""
+
+def loop_factory(**options: Any) -> LoopFactory:
+    """What closes the loop; options are those of `testbed.closed_loop.ClosedLoop`."""
 
     def make_loop(n: int, clean: NDArray, dt: float) -> ClosedLoop:
-        return ClosedLoop(n, clean, dt, observer=observer, management=management, protection=protection, boots=boots,
-                          estimator=estimator)
+        return ClosedLoop(n, clean, dt, **options)
 
     return make_loop
 
 
 def _loop(options: dict[str, Any]) -> LoopFactory:
-    parts = {name: options.pop(name, True) for name in ("observer", "management", "protection", "boots")}
-    estimator = options.pop("estimator", "hinf")
+    parts = {name: options.pop(name, True) for name in PARTS}
+    chosen = {name: options.pop(name) for name in CHOICES if name in options}
     bare = options.get("mode", "surfaces") == "surfaces" and options.get("axes", "all") == "all"
-    return NoLoop if bare and not any(parts.values()) else loop_factory(**parts, estimator=estimator)
+    return NoLoop if bare and not any(parts.values()) else loop_factory(**parts, **chosen)
 
 
 def make(**options: Any) -> TwinOtterEnv:
-    """One aircraft. Options: those of `TwinOtterEnv`, and observer, management, protection, boots (all True)."""
+    """One aircraft. Options: those of `TwinOtterEnv`, and those of `testbed.closed_loop.ClosedLoop`."""
     compile_beside("testbed.environments")
     return TwinOtterEnv(loop=_loop(options), **options)
 
 
 def make_vector(num_envs: int = 1, **options: Any) -> TwinOtterVectorEnv:
-    """Many aircraft. Options: those of `TwinOtterVectorEnv`, and observer, management, protection, boots."""
+    """Many aircraft. Options: those of `TwinOtterVectorEnv` and of `testbed.closed_loop.ClosedLoop`."""
     compile_beside("testbed.environments")
     return TwinOtterVectorEnv(num_envs, loop=_loop(options), **options)
 

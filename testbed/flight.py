@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from controllers.choice import LAWS
 from icing_env.atmosphere import density
 from icing_env.errors import InputError, nearest
 from icing_env.record import COLUMNS, FlightRecord, Geometry, RecordMeta
@@ -35,12 +36,11 @@ class Controller:
     name: str
     description: str
     kind: str  # classical, adaptive, learned, oracle
-    steers: bool  # the autopilot flies the task; else the controls stay where the trim put them
+    law: str | None  # of controllers.choice.LAWS, flies the task; None: the controls stay where the trim put them
 
 
-CONTROLLERS = {
-    "autopilot": Controller("autopilot", "pitch, roll, altitude, speed and heading holds", "classical", True),
-    "hands_off": Controller("hands_off", "controls held at the trim", "classical", False),
+CONTROLLERS = {name: Controller(name, law.description, law.kind, name) for name, law in LAWS.items()} | {
+    "hands_off": Controller("hands_off", "controls held at the trim", "classical", None),
 }
 
 
@@ -74,8 +74,9 @@ def make_world(scenario: Scenario, n: int = 1, who: str = "autopilot", protectio
     """World in which a controller flies a scenario, with or without ice management and protection."""
     pilot = controller(who)
     boots = scenario.ice_protection == "management"
-    loop = loop_factory(observer=observer, management=protection, protection=protection, boots=boots and protection)
-    return World(scenario, n, loop, mode=None if pilot.steers else "surfaces", threads=threads)
+    loop = loop_factory(observer=observer, management=protection, protection=protection, boots=boots and protection,
+                        law=pilot.law or "autopilot")
+    return World(scenario, n, loop, mode="surfaces" if pilot.law is None else None, threads=threads)
 
 
 def fly(scenario: Scenario, who: str = "autopilot", seed: int = 0, *, protection: bool = True, observer: bool = True,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers import autopilot, ice_management
-from icing_env.types import COMMAND, ESTIMATE, MEASUREMENT, structured
+from controllers import ice_management
+from icing_env.types import COMMAND, ESTIMATE, MEASUREMENT, TARGET, structured
 
 # Clean DHC-6: UIUC/FDC derivatives, geometry and mass of the 2002 flight records, onset of separation as assumed.
 TWIN_OTTER = {
@@ -79,7 +79,7 @@ def requested(n: int, seed: int) -> NDArray:
 def targets(n: int, seed: int) -> NDArray:
     """Random targets in every mode."""
     rng = np.random.default_rng(seed)
-    t = np.zeros(n, autopilot.TARGET)
+    t = np.zeros(n, TARGET)
     t["pitch_mode"] = rng.integers(0, 3, n)
     t["speed_mode"] = rng.integers(0, 2, n)
     t["roll_mode"] = rng.integers(0, 2, n)
@@ -93,3 +93,10 @@ def targets(n: int, seed: int) -> NDArray:
 def free(n: int = 1) -> NDArray:
     """Advisories that limit nothing."""
     return ice_management.init(n)
+
+
+def steer(law, memory: NDArray, command: NDArray, m: NDArray, target: NDArray, advisory: NDArray, gains: NDArray,
+          dt: float, estimate: NDArray | None = None) -> None:
+    """One step of a law for an aircraft that it believes clean, unless an estimate is given."""
+    estimate = believed(len(command)) if estimate is None else estimate
+    law.step(memory, command, m, estimate, target, advisory, airframe(), gains, dt)

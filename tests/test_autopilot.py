@@ -4,29 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from controlled import cruise, free, requested, scattered, targets
+from controlled import cruise, free, requested, scattered, steer, targets
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controllers import autopilot
+from controllers.laws import autopilot
 from controllers.parameters import read_parameters
 from icing_env.errors import InputError
-from icing_env.types import COMMAND
+from icing_env.types import COMMAND, TARGET
 
 DT = 0.02
 
 
 def one_step(m, advisory=None, gains=None, start=None, **target):
     """Engage in cruise (or at `start`), then one step with the measurement `m`; returns command and autopilot."""
-    t = np.zeros(1, autopilot.TARGET)
+    t = np.zeros(1, TARGET)
     level = {"pitch_mode": 1, "altitude": 2200.0, "speed_mode": 1, "airspeed": 72.0, "theta": 0.02, "throttle": 0.6}
     for name, value in {**level, **target}.items():
         t[name] = value
     a, c = autopilot.init(1), np.zeros(1, COMMAND)
     advisory = free() if advisory is None else advisory
-    gains = autopilot.load_gains() if gains is None else gains
-    autopilot.step(a, c, cruise() if start is None else start, t, advisory, gains, DT)
-    autopilot.step(a, c, m, t, advisory, gains, DT)
+    gains = autopilot.default_gains() if gains is None else gains
+    steer(autopilot, a, c, cruise() if start is None else start, t, advisory, gains, DT)
+    steer(autopilot, a, c, m, t, advisory, gains, DT)
     return c[0], a[0]
 
 
@@ -78,21 +78,21 @@ def test_heading_goes_the_short_way():
 
 
 def test_integrators_do_not_wind_up():
-    gains = autopilot.load_gains()
-    a, c, t, m = autopilot.init(1), np.zeros(1, COMMAND), np.zeros(1, autopilot.TARGET), cruise()
+    gains = autopilot.default_gains()
+    a, c, t, m = autopilot.init(1), np.zeros(1, COMMAND), np.zeros(1, TARGET), cruise()
     t["theta"], t["speed_mode"], t["airspeed"], t["phi"] = 0.35, 1, 120.0, 0.4
     m["theta"], m["phi"] = -0.3, -1.0
     for _ in range(6000):  # two minutes that no surface can mend
-        autopilot.step(a, c, m, t, free(), gains, DT)
+        steer(autopilot, a, c, m, t, free(), gains, DT)
     saturated = c.copy()
     assert saturated["elevator"] == gains["elevator_min"] and saturated["throttle_left"] == 1.0
     m["theta"], m["phi"], m["airspeed"] = 0.40, 0.6, 121.0  # just beyond the targets: all leave their limits at once
-    autopilot.step(a, c, m, t, free(), gains, DT)
+    steer(autopilot, a, c, m, t, free(), gains, DT)
     assert c["elevator"] > saturated["elevator"]
     assert c["aileron"] > saturated["aileron"]
     m["ax"], m["az"] = 9.80665*np.sin(0.40), -9.80665*np.cos(0.40)  # steady
     for _ in range(300):  # the airspeed filter follows in a few seconds
-        autopilot.step(a, c, m, t, free(), gains, DT)
+        steer(autopilot, a, c, m, t, free(), gains, DT)
     assert c["throttle_left"] < 1.0
 
 
@@ -108,12 +108,12 @@ def test_a_protection_that_acts_stops_the_pulling_integrator():
 def test_advisory_limits_what_is_asked_for():
     advisory = free()
     advisory["bank_limit"], advisory["airspeed_limit"], advisory["flap_limit"] = 0.1, 80.0, 0.35
-    gains = autopilot.load_gains()
-    a, c, m, t = autopilot.init(1), np.zeros(1, COMMAND), cruise(), np.zeros(1, autopilot.TARGET)
+    gains = autopilot.default_gains()
+    a, c, m, t = autopilot.init(1), np.zeros(1, COMMAND), cruise(), np.zeros(1, TARGET)
     t["pitch_mode"], t["altitude"], t["speed_mode"], t["airspeed"] = 1, 2400.0, 1, 60.0
     t["phi"], t["flap"], m["airspeed"] = 0.5, 0.65, 75.0
     for _ in range(200):
-        autopilot.step(a, c, m, t, advisory, gains, DT)
+        steer(autopilot, a, c, m, t, advisory, gains, DT)
     assert a["bank_command"] == pytest.approx(0.1)
     assert c["flap"] == 0.35
     assert c["throttle_left"] > 0.6  # towards the limit, not the target
@@ -127,9 +127,9 @@ def test_advisory_limits_what_is_asked_for():
 @given(st.integers(0, 2**32 - 1))
 def test_finite_in_finite_and_within_limits_out(seed):
     n = 16
-    a, c, gains = autopilot.init(n), requested(n, seed), autopilot.load_gains()
+    a, c, gains = autopilot.init(n), requested(n, seed), autopilot.default_gains()
     for k in range(4):
-        autopilot.step(a, c, scattered(n, seed + k), targets(n, seed), free(n), gains, DT)
+        steer(autopilot, a, c, scattered(n, seed + k), targets(n, seed), free(n), gains, DT)
     for row in (a, c):
         assert all(np.isfinite(row[name]).all() for name in row.dtype.names)
     assert (c["elevator"] >= gains["elevator_min"]).all() and (c["elevator"] <= gains["elevator_max"]).all()
@@ -139,15 +139,15 @@ def test_finite_in_finite_and_within_limits_out(seed):
 
 
 def test_single_equals_batch_bit_for_bit():
-    n, gains = 7, autopilot.load_gains()
+    n, gains = 7, autopilot.default_gains()
     t, batch, c = targets(n, 1), autopilot.init(n), requested(n, 1)
     alone, single = autopilot.init(n), requested(n, 1)
     for k in range(20):
         m = scattered(n, k)
-        autopilot.step(batch, c, m, t, free(n), np.repeat(gains, n), DT)
+        steer(autopilot, batch, c, m, t, free(n), np.repeat(gains, n), DT)
         for i in range(n):
             j = slice(i, i + 1)
-            autopilot.step(alone[j], single[j], m[j], t[j], free(1), gains, DT)
+            steer(autopilot, alone[j], single[j], m[j], t[j], free(1), gains, DT)
     assert batch.tobytes() == alone.tobytes() and c.tobytes() == single.tobytes()
 
 

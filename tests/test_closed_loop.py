@@ -9,7 +9,9 @@ import pytest
 from controlled import believed
 from numpy.typing import NDArray
 
-from controllers import autopilot, envelope_protection, ice_management
+from controllers import ice_management
+from controllers.laws import autopilot
+from controllers.protection import surfaces
 from estimators.airframe import airframe_from
 from estimators.hinf import init
 from estimators.hinf import step as observe
@@ -17,7 +19,7 @@ from estimators.hinf.tuning import default_tuning
 from icing_env import aircraft
 from icing_env.simulate import Fleet
 from icing_env.trim import trim
-from icing_env.types import ESTIMATE, SURFACES
+from icing_env.types import ESTIMATE, SURFACES, TARGET
 
 DT = 0.02
 LEVEL = 2200.0
@@ -39,7 +41,7 @@ class Flight:
         self.fleet.start()
         self.trimmed = self.fleet.command.copy()
         self.autopilot, self.advisory = autopilot.init(n), ice_management.init(n)
-        self.target = np.zeros(n, autopilot.TARGET)
+        self.target = np.zeros(n, TARGET)
         for name, value in {"pitch_mode": 1, "altitude": LEVEL, "speed_mode": 1, "roll_mode": 1}.items():
             self.target[name] = value
         self.target["airspeed"] = speeds
@@ -48,7 +50,7 @@ class Flight:
         self.estimate["excitation_longitudinal"] = 0.0
         self.airframe, self.tuning = airframe_from(parameters), default_tuning()
         self.observer = init(self.airframe, self.tuning, n) if observed else None
-        self.gains = autopilot.load_gains(), ice_management.load_tuning(), envelope_protection.load_tuning()
+        self.gains = autopilot.default_gains(), ice_management.load_tuning(), surfaces.load_tuning()
         self.changed = np.zeros(n, bool)
 
     def fly(self, seconds: float, stick: Callable[[NDArray], None] | None = None, protect: bool = True) -> NDArray:
@@ -63,14 +65,16 @@ class Flight:
                 observe(self.observer, self.estimate, f.measurement, self.airframe, self.tuning, DT)
             ice_management.step(self.advisory, self.estimate, f.measurement, f.parameters, ims, DT)
             if stick is None:
-                autopilot.step(self.autopilot, f.command, f.measurement, self.target, self.advisory, gains, DT)
+                autopilot.step(self.autopilot, f.command, f.measurement, self.estimate, self.target, self.advisory,
+                               f.parameters, gains, DT)
             else:
                 f.command[:] = self.trimmed
                 stick(f.command)
             asked = f.command.copy()
             if protect:
-                envelope_protection.protect(
-                    f.command, self.advisory, f.measurement, self.estimate, f.parameters, protection, DT)
+                surfaces.protect(
+                    surfaces.init(f.n), f.command, self.advisory, f.measurement, self.estimate, f.parameters,
+                    protection, DT)
             self.changed |= asked != f.command
             f.step()
             o, m = f.outcome, f.measurement

@@ -8,7 +8,8 @@ from controlled import airframe, believed, cruise, requested, scattered
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controllers import envelope_protection, ice_management
+from controllers import ice_management
+from controllers.protection import surfaces
 
 DT = 0.02
 
@@ -27,7 +28,7 @@ def advised(n=1, severity=0.0, m=None):
 def protected(c, a, m, e=None):
     """What the protection makes of a command (a copy)."""
     c, e = c.copy(), believed(len(c)) if e is None else e
-    envelope_protection.protect(c, a, m, e, airframe(), envelope_protection.load_tuning(), DT)
+    surfaces.protect(surfaces.init(len(c)), c, a, m, e, airframe(), surfaces.load_tuning(), DT)
     return c
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_aircraft import controls
 
-from controllers import autopilot
+from controllers.laws import autopilot
 from estimators import hinf
 from estimators.airframe import airframe_from
 from estimators.hinf.tuning import default_tuning
@@ -39,7 +39,7 @@ def fly(
         target[mode] = 1
     target["altitude"], target["airspeed"] = ALTITUDE, AIRSPEED
     advisory["alpha_limit"], advisory["bank_limit"], advisory["flap_limit"] = 0.2, 1.0, 0.6
-    gains, held = autopilot.load_gains(), fleet.command.copy()
+    gains, held = autopilot.default_gains(), fleet.command.copy()
     airframe, tuning = airframe_from(parameters), default_tuning()
     observer, now = hinf.init(airframe, tuning, n, start), np.zeros(n, ESTIMATE)
     out = np.zeros((round(seconds / DT), n), ESTIMATE)
@@ -50,7 +50,7 @@ def fly(
             for name, change in zip(("elevator", "aileron", "rudder"), controls((k * DT) % 20.0), strict=True):
                 fleet.command[name] = held[name] + change
         else:
-            autopilot.step(pilot, fleet.command, fleet.measurement, target, advisory, gains, DT)
+            autopilot.step(pilot, fleet.command, fleet.measurement, now, target, advisory, parameters, gains, DT)
         fleet.step()
         hinf.step(observer, now, fleet.measurement, airframe, tuning, DT)
         out[k] = now

@@ -19,6 +19,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from controllers.kernels import airspeed_rate, alpha_rate, clip, positive_part
@@ -101,23 +102,23 @@ def protect_bank(c: Any, a: Any, m: Any, g: Any) -> None:
     most = max(g.K_bank*(predicted + a.bank_limit), -g.aileron_max)
     raised = positive_part(least - c.aileron, g.aileron_round)
     lowered = positive_part(c.aileron - most, g.aileron_round)
+    a.intervention_aileron = raised - lowered
     if raised > 0.0 or lowered > 0.0:
         c.aileron = c.aileron + raised - lowered
 
 
+def init(n: int) -> NDArray[Any]:
+    """Memory of `n` aircraft: this protection has none."""
+    return np.zeros(n)
+
+
 @entry
-def protect(
-    command: NDArray[Any],
-    advisory: NDArray[Any],
-    measurement: NDArray[Any],
-    estimate: NDArray[Any],
-    airframe: NDArray[Any],
-    tuning: NDArray[Any],
-    dt: float,
-) -> None:
+def protect(memory: NDArray[Any], command: NDArray[Any], advisory: NDArray[Any], measurement: NDArray[Any],
+            estimate: NDArray[Any], airframe: NDArray[Any], tuning: NDArray[Any], dt: float) -> None:
     """Keep every aircraft inside its advised envelope: changes `command` and the advisory's `intervention` in place.
 
     Args:
+        memory: of `init`, not used.
         command: COMMAND rows as the controller wants them; changed only near or beyond a limit.
         advisory: ADVISORY rows with the limits.
         measurement: MEASUREMENT rows.

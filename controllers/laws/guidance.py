@@ -1,17 +1,14 @@
-"""A classical autopilot: pitch, altitude, climb-rate and airspeed holds; bank and heading holds; yaw damper.
+"""Guidance: the outer loops that every classical law shares, from targets to pitch, bank and power.
 
 Successive loop closure (McRuer, Ashkenas & Graham, Aircraft Dynamics and Automatic Control, chapters 7-8; Stevens,
-Lewis & Johnson, Aircraft Control and Simulation, 3rd ed., section 4.6), with the structure of the pitch and roll
-attitude holds of the Smart Icing Systems autopilot. Signs: positive elevator pitches down, positive aileron rolls left,
-positive rudder yaws left; so too little pitch gives negative elevator, too little bank negative aileron.
+Lewis & Johnson, Aircraft Control and Simulation, 3rd ed., section 4.6). A law's memory begins with GUIDANCE_FIELDS, its
+gains with GUIDANCE_GAINS_FIELDS; its inner loop, from pitch and bank asked for to the surfaces, is its own.
 
-* s = qbar_reference / qbar scales every surface gain, as surface power goes with dynamic pressure
+* s = qbar_reference / qbar: surface power goes with dynamic pressure
 * vertical speed and airspeed: complementary filters of acceleration with pressure altitude and pitot, so that neither
   gusts on the vane nor noise of the pitot move the controls
 * theta_command = pitch trim + K (climb-rate error)/V + compensation of the lift lost in a bank
-* elevator = trim + s [K_theta (theta - theta_command) + K_q (q - q_turn)], q_turn = (g/V) sin phi tan phi
-* bank_command = atan(V K_psi (heading error)/g), slewed; aileron = trim + s [K_phi (phi - bank_command) + K_p p]
-* rudder = trim + s K_r (r - r_turn), r_turn = (g/V) sin phi cos theta; its trim keeps the ball centred
+* bank_command = atan(V K_psi (heading error)/g), slewed
 * throttle = trim + K_V (airspeed error) + K_climb (climb-rate command)
 
 The advisory limits what is asked for: bank, lowest airspeed (raises the airspeed target, and the climb yields to the
@@ -30,29 +27,23 @@ from numpy.typing import NDArray
 from controllers.kernels import air_density, airspeed_of, airspeed_rate, clip, integrated, wrapped
 from controllers.parameters import read_parameters
 from icing_env.atmosphere import G0
-from icing_env.jit import entry, kernel
-from icing_env.types import TARGET, Field, structured  # noqa: F401  (TARGET: what `step` takes)
+from icing_env.jit import kernel
+from icing_env.types import Field, structured
 
-AUTOPILOT_FIELDS: list[Field] = [
+GUIDANCE_FIELDS: list[Field] = [
     ("engaged", "0/1", "0 until the first step, which starts the integrators where the controls are"),
     ("altitude", "m", "altitude of the complementary filter"),
     ("climb_rate", "m/s", "vertical speed of the complementary filter"),
     ("airspeed", "m/s", "airspeed of the complementary filter"),
     ("climb_command", "m/s", "climb rate asked for now, slewed"),
     ("pitch_trim", "rad", "integrator of the climb-rate hold"),
-    ("elevator_trim", "rad", "integrator of the pitch hold"),
     ("throttle_trim", "0..1", "integrator of the airspeed hold"),
     ("bank_command", "rad", "bank asked for now, slewed"),
-    ("aileron_trim", "rad", "integrator of the bank hold"),
-    ("rudder_trim", "rad", "integrator of the lateral specific force"),
 ]
-GAINS_FIELDS: list[Field] = [
+GUIDANCE_GAINS_FIELDS: list[Field] = [
     ("qbar_reference", "Pa", "dynamic pressure at which the surface gains hold"),
     ("scale_min", "1", "least scaling of the surface gains"),
     ("scale_max", "1", "largest scaling of the surface gains"),
-    ("K_theta", "1", "elevator per pitch error"),
-    ("K_theta_integral", "1/s", "elevator rate per pitch error"),
-    ("K_q", "s", "elevator per pitch rate"),
     ("K_climb", "1", "pitch command per error of the flight-path angle"),
     ("K_climb_integral", "1/s", "its integral"),
     ("K_altitude", "1/s", "climb-rate command per altitude error"),
@@ -64,12 +55,7 @@ GAINS_FIELDS: list[Field] = [
     ("K_airspeed_integral", "1/m", "throttle rate per airspeed error"),
     ("K_throttle_climb", "s/m", "throttle per climb-rate command"),
     ("K_speed_priority", "1", "climb rate allowed per airspeed above the limit"),
-    ("K_phi", "1", "aileron per bank error"),
-    ("K_phi_integral", "1/s", "aileron rate per bank error"),
-    ("K_p", "s", "aileron per roll rate"),
     ("K_heading", "1/s", "turn rate per heading error"),
-    ("K_r", "s", "rudder per yaw rate beyond that of the turn"),
-    ("K_ay_integral", "rad s/m", "rudder rate per lateral specific force"),
     ("climb_max", "m/s", "largest climb and descent rate asked for"),
     ("climb_slew", "m/s2", "slew rate of the climb-rate command"),
     ("theta_min", "rad", "lowest pitch asked for"),
@@ -85,35 +71,44 @@ GAINS_FIELDS: list[Field] = [
     ("throttle_min", "0..1", "flight idle"),
     ("throttle_max", "0..1", "largest power lever"),
 ]
-AUTOPILOT = structured(AUTOPILOT_FIELDS)
-GAINS = structured(GAINS_FIELDS)
 
 
-def load_gains(name: str | Path = "autopilot") -> NDArray[Any]:
-    """Gains of the autopilot, one row of GAINS. Raises InputError for a file that does not fit."""
-    return read_parameters(name, GAINS_FIELDS)
+def load_gains(name: str | Path, own: list[Field]) -> NDArray[Any]:
+    """Gains of a law, one row: those of the outer loops, then its own.
 
+    Args:
+        name: the law's file within configs/controllers/, or a path; the outer loops have their own, guidance.toml.
+        own: name, unit and meaning of every number of the law's file.
 
-def init(n: int) -> NDArray[Any]:
-    """Autopilots of `n` aircraft, not yet engaged (AUTOPILOT rows)."""
-    return np.zeros(n, AUTOPILOT)
+    Raises:
+        InputError: a file that does not fit.
+    """
+    row = np.zeros(1, structured([*GUIDANCE_GAINS_FIELDS, *own]))
+    for part in (read_parameters("guidance", GUIDANCE_GAINS_FIELDS), read_parameters(name, own)):
+        for field in part.dtype.names or ():
+            row[field] = part[field]
+    return row
 
 
 @kernel
-def engage(a: Any, m: Any, t: Any, g: Any) -> None:
-    """Start every integrator where the controls are, so that engaging moves nothing."""
+def engage_guidance(a: Any, m: Any, t: Any, g: Any) -> None:
+    """Start the outer loops where the controls are, so that engaging moves nothing."""
     a.engaged = 1.0
     a.altitude = m.altitude
     a.climb_rate = airspeed_of(m)*math.sin(m.theta - m.alpha*math.cos(m.phi))
     a.climb_command = a.climb_rate
     a.airspeed = m.airspeed
     a.pitch_trim = m.theta
-    a.elevator_trim = m.elevator
     climb = 0.0 if t.pitch_mode == 0.0 else a.climb_rate
     a.throttle_trim = 0.5*(m.throttle_left + m.throttle_right) - g.K_throttle_climb*climb
     a.bank_command = m.phi
-    a.aileron_trim = m.aileron
-    a.rudder_trim = m.rudder
+
+
+@kernel
+def surface_scale(m: Any, g: Any) -> float:
+    """Scaling of surface gains with dynamic pressure, within its bounds."""
+    qbar = 0.5*air_density(m)*airspeed_of(m)*airspeed_of(m)
+    return clip(g.qbar_reference/qbar, g.scale_min, g.scale_max)
 
 
 @kernel
@@ -156,19 +151,6 @@ def pitch_command(a: Any, m: Any, t: Any, adv: Any, g: Any, climb: float, scale:
 
 
 @kernel
-def hold_pitch(a: Any, c: Any, m: Any, adv: Any, g: Any, theta: float, scale: float, dt: float) -> None:
-    """Elevator that holds a pitch angle; its integrator does not pull against the protection."""
-    q_turn = G0/airspeed_of(m)*math.sin(m.phi)*math.tan(clip(m.phi, -1.3, 1.3))
-    error = m.theta - theta
-    wanted = a.elevator_trim + scale*(g.K_theta*error + g.K_q*(m.q - q_turn))
-    rate = scale*g.K_theta_integral*error*dt
-    if adv.intervention > 0.0:
-        rate = max(rate, 0.0)
-    a.elevator_trim = integrated(a.elevator_trim, rate, wanted, g.elevator_min, g.elevator_max)
-    c.elevator = clip(wanted, g.elevator_min, g.elevator_max)
-
-
-@kernel
 def hold_airspeed(a: Any, c: Any, m: Any, t: Any, adv: Any, g: Any, climb: float, dt: float) -> None:
     """Both power levers."""
     wanted = t.throttle
@@ -183,8 +165,8 @@ def hold_airspeed(a: Any, c: Any, m: Any, t: Any, adv: Any, g: Any, climb: float
 
 
 @kernel
-def hold_bank(a: Any, c: Any, m: Any, t: Any, adv: Any, g: Any, scale: float, dt: float) -> None:
-    """Aileron that holds a bank angle or, through it, a heading."""
+def command_bank(a: Any, m: Any, t: Any, adv: Any, g: Any, dt: float) -> bool:
+    """Move the bank asked for towards the target, within the limits; True once it is there."""
     wanted = t.phi
     if t.roll_mode == 1.0:
         wanted = math.atan(airspeed_of(m)*g.K_heading*wrapped(t.heading - m.psi)/G0)
@@ -192,56 +174,27 @@ def hold_bank(a: Any, c: Any, m: Any, t: Any, adv: Any, g: Any, scale: float, dt
     left = clip(wanted, -limit, limit) - a.bank_command
     slew = g.bank_rate*dt
     a.bank_command += clip(left, -slew, slew)
-    error = m.phi - a.bank_command
-    wanted = a.aileron_trim + scale*(g.K_phi*error + g.K_p*m.p)
-    rate = scale*g.K_phi_integral*error*dt if abs(left) <= slew else 0.0  # a lag behind the slew is no lack of trim
-    a.aileron_trim = integrated(a.aileron_trim, rate, wanted, -g.aileron_max, g.aileron_max)
-    c.aileron = clip(wanted, -g.aileron_max, g.aileron_max)
+    return abs(left) <= slew
 
 
 @kernel
-def damp_yaw(a: Any, c: Any, m: Any, g: Any, scale: float, dt: float) -> None:
-    """Rudder: damps the yaw rate beyond that of a coordinated turn and slowly centres the ball."""
-    r_turn = G0/airspeed_of(m)*math.sin(m.phi)*math.cos(m.theta)
-    wanted = a.rudder_trim + scale*g.K_r*(m.r - r_turn)
-    rate = scale*g.K_ay_integral*m.ay*dt
-    a.rudder_trim = integrated(a.rudder_trim, rate, wanted, -g.rudder_max, g.rudder_max)
-    c.rudder = clip(wanted, -g.rudder_max, g.rudder_max)
+def turn_pitch_rate(m: Any) -> float:
+    """Pitch rate [rad/s] of the level turn at this bank: (g/V) sin phi tan phi."""
+    return G0/airspeed_of(m)*math.sin(m.phi)*math.tan(clip(m.phi, -1.3, 1.3))
 
 
-@entry
-def step(
-    autopilot: NDArray[Any],
-    command: NDArray[Any],
-    measurement: NDArray[Any],
-    target: NDArray[Any],
-    advisory: NDArray[Any],
-    gains: NDArray[Any],
-    dt: float,
-) -> None:
-    """One step of every autopilot, in place.
+@kernel
+def turn_yaw_rate(m: Any) -> float:
+    """Yaw rate [rad/s] of the level turn at this bank: (g/V) sin phi cos theta."""
+    return G0/airspeed_of(m)*math.sin(m.phi)*math.cos(m.theta)
 
-    Args:
-        autopilot: AUTOPILOT rows, one per aircraft; changed.
-        command: COMMAND rows; surfaces, power levers and flap are written, ice protection is left alone.
-        measurement: MEASUREMENT rows.
-        target: TARGET rows.
-        advisory: ADVISORY rows.
-        gains: one GAINS row for all, or one per aircraft.
-        dt: time since the last step [s].
-    """
-    for i in range(len(command)):
-        a, c, m, t, adv = autopilot[i], command[i], measurement[i], target[i], advisory[i]
-        g = gains[i if len(gains) > 1 else 0]
-        if a.engaged == 0.0:
-            engage(a, m, t, g)
-        qbar = 0.5*air_density(m)*airspeed_of(m)*airspeed_of(m)
-        scale = clip(g.qbar_reference/qbar, g.scale_min, g.scale_max)
-        navigate(a, m, g, dt)
-        climb = 0.0 if t.pitch_mode == 0.0 else climb_command(a, t, adv, g, dt)
-        theta = pitch_command(a, m, t, adv, g, climb, scale, dt)
-        hold_pitch(a, c, m, adv, g, theta, scale, dt)
-        hold_airspeed(a, c, m, t, adv, g, climb, dt)
-        hold_bank(a, c, m, t, adv, g, scale, dt)
-        damp_yaw(a, c, m, g, scale, dt)
-        c.flap = max(min(t.flap, adv.flap_limit), 0.0)
+
+@kernel
+def guide(a: Any, c: Any, m: Any, t: Any, adv: Any, g: Any, scale: float, dt: float) -> float:
+    """Outer loops of one step: power and flap into `c`, bank asked for into `a`; returns the pitch asked for [rad]."""
+    navigate(a, m, g, dt)
+    climb = 0.0 if t.pitch_mode == 0.0 else climb_command(a, t, adv, g, dt)
+    theta = pitch_command(a, m, t, adv, g, climb, scale, dt)
+    hold_airspeed(a, c, m, t, adv, g, climb, dt)
+    c.flap = max(min(t.flap, adv.flap_limit), 0.0)
+    return theta

@@ -1,0 +1,44 @@
+"""Every control law and every envelope protection, by name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from types import ModuleType
+
+from icing_env.errors import InputError, nearest
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of them: its module, what it is, and of which kind."""
+
+    module: str
+    description: str
+    kind: str = "classical"  # classical, adaptive
+
+    def load(self) -> ModuleType:
+        """The module: `init(n)`; a law has `default_gains` and `step`, a protection `load_tuning` and `protect`."""
+        return import_module(self.module)
+
+
+LAWS: dict[str, Choice] = {
+    "autopilot": Choice("controllers.laws.autopilot", "cascaded PID: attitude, altitude, speed and heading holds"),
+}
+PROTECTIONS: dict[str, Choice] = {
+    "surfaces": Choice("controllers.protection.surfaces", "surfaces kept within what the limits allow"),
+}
+
+
+def law(name: str) -> ModuleType:
+    """The module of a law; InputError names the nearest."""
+    if name not in LAWS:
+        raise InputError(f"no control law '{name}': {nearest(name, list(LAWS))}")
+    return LAWS[name].load()
+
+
+def protection(name: str) -> ModuleType:
+    """The module of a protection; InputError names the nearest."""
+    if name not in PROTECTIONS:
+        raise InputError(f"no envelope protection '{name}': {nearest(name, list(PROTECTIONS))}")
+    return PROTECTIONS[name].load()
