@@ -51,7 +51,7 @@ class Initial(Strict):
 class Task(Strict):
     """What is to be flown."""
 
-    kind: Literal["hold", "climb", "holding_pattern", "approach", "doublets"] = "hold"
+    kind: Literal["hold", "climb", "holding_pattern", "approach", "doublets", "steps"] = "hold"
     climb_rate: float = 3.0  # m/s
     glide_angle: float = math.radians(3.0)  # rad
     slow_to: float = 45.0  # m/s, end of the approach
@@ -153,6 +153,7 @@ WEIGHTS_OF: dict[str, dict[str, float]] = {
     "holding_pattern": {**COMMON, "altitude": 0.5, "heading": 0.3},
     "approach": {**COMMON, "altitude": 0.5, "climb_rate": 0.2, "heading": 0.3},
     "doublets": {**COMMON, "altitude": 0.5, "heading": 0.3},
+    "steps": {**COMMON, "altitude": 0.5, "heading": 0.3},
 }
 assert set(WEIGHTS_OF) == set(TASKS)
 

@@ -2,8 +2,9 @@
 
 Tasks: hold (altitude, airspeed, heading), climb (at a rate), holding_pattern (racetrack of one-minute legs and
 standard-rate turns, 14 CFR 91 practice), approach (3 deg glide path, slowing, flap in three steps), doublets (hold
-between test inputs). References go to the autopilot's TARGET; errors, asked less measured, go to the observation;
-reward terms and the end of an episode use the truth, which no observation holds.
+between test inputs), steps (of altitude and heading, for settling and overshoot). References go to the autopilot's
+TARGET; errors, asked less measured, go to the observation; reward terms and the end of an episode use the truth, which
+no observation holds.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from icing_env.jit import entry, kernel
 from icing_env.types import Field, structured
 
-TASKS = ("hold", "climb", "holding_pattern", "approach", "doublets")
+TASKS = ("hold", "climb", "holding_pattern", "approach", "doublets", "steps")
 REASONS = ("", "ground", "structure", "upset")  # why an episode was terminated
 REWARD_TERMS = ("alive", "altitude", "airspeed", "heading", "climb_rate", "smoothness", "envelope", "terminal")
 
@@ -46,6 +47,9 @@ TASK_FIELDS: list[Field] = [
 ]
 TASK = structured(TASK_FIELDS)
 WEIGHTS = np.dtype([(term, "f8") for term in REWARD_TERMS])
+
+# The task "steps": altitude steps up at the first time, heading at the second and back at the third.
+STEP_TIMES, ALTITUDE_STEP, HEADING_STEP = (10.0, 50.0, 85.0), 30.0, math.radians(20.0)  # s, m, rad; assumed
 
 # Ends of an episode. Load factors: limit +3.8/-1.52 (FlightGear dhc6-base.xml) times 1.5 (14 CFR 23.303); airspeed:
 # 1.25 x Vne 170 kt; attitudes: assumed, beyond recovery by any controller here.
@@ -84,6 +88,11 @@ def refer(k: Any, g: Any, time: float) -> None:
         g.altitude = k.start_altitude + k.climb*time
         g.airspeed = k.start_airspeed + share*(k.slow_to - k.start_airspeed)
         g.flap = k.full_flap*min(math.floor(time/20.0) + 1.0, 3.0)/3.0
+    elif k.kind == 5.0:
+        if time >= STEP_TIMES[0]:
+            g.altitude = k.start_altitude + ALTITUDE_STEP
+        if STEP_TIMES[1] <= time < STEP_TIMES[2]:
+            g.heading = k.start_heading + HEADING_STEP
 
 
 @kernel

@@ -37,6 +37,12 @@ class Controller:
     description: str
     kind: str  # classical, adaptive, learned, oracle
     law: str | None  # of controllers.choice.LAWS, flies the task; None: the controls stay where the trim put them
+    episodes: int = 1_000_000  # most that a comparison flies; fewer for a controller that takes long
+
+    @property
+    def members(self) -> tuple[str, ...]:
+        """Names that fly under this one: itself."""
+        return (self.name,)
 
 
 CONTROLLERS = {name: Controller(name, law.description, law.kind, name) for name, law in LAWS.items()} | {

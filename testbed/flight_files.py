@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +9,7 @@ import numpy as np
 
 from icing_env import record
 from icing_env.errors import InputError
+from testbed.files import write_whole
 from testbed.flight import Flight
 
 
@@ -26,15 +25,8 @@ def write(flight: Flight, path: Path) -> None:
 
 def write_table(columns: dict[str, np.ndarray], path: Path) -> None:
     """Columns of equal length to CSV, whole or not at all."""
-    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            np.savetxt(file, np.column_stack(list(columns.values())), fmt="%.9g", delimiter=",",
-                       header=",".join(columns), comments="")
-        os.replace(name, path)
-    except BaseException:
-        os.unlink(name)
-        raise
+    write_whole(path, lambda file: np.savetxt(file, np.column_stack(list(columns.values())), fmt="%.9g", delimiter=",",
+                                              header=",".join(columns), comments=""))
 
 
 def summary(flight: Flight) -> dict[str, Any]:

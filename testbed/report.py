@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import base64
 import io
-import os
 import re
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +17,7 @@ import jinja2
 import numpy as np
 
 from icing_env.errors import InputError, nearest
+from testbed.files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -190,16 +189,4 @@ class Report:
 
     def write(self, path: str | Path) -> Path:
         """Write the report to `path`, whole or not at all; folders are made as needed. Returns the path."""
-        target = Path(path)
-        content = self.html()
-        target.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".part")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as part:
-                part.write(content)
-            Path(name).chmod(0o644)
-            Path(name).replace(target)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
-        return target
+        return write_whole(path, self.html())

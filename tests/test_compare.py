@@ -31,9 +31,10 @@ def made(alive: int = N, reason: str = "", **channels: np.ndarray) -> Trace:
     """One episode in which nothing happens but what is given."""
     names = {name for kind, names in SAMPLES.items() if kind != "command" for name in names}
     names |= {f"command_{name}" for name in SAMPLES["command"]}
-    names |= {"excess_drag", "slope_lost", "elevator_lost", "thrust_lost", "alpha_margin", "ice_mass"}
+    names |= {"excess_drag", "slope_lost", "elevator_lost", "thrust_lost", "alpha_margin", "ice_mass", "bank",
+              "stall_speed"}
     values = {name: np.zeros((N, 1)) for name in names}
-    values["alpha_margin"][:] = 0.1
+    values["alpha_margin"][:], values["airspeed"][:], values["load_factor"][:] = 0.1, 70.0, 1.0
     values |= {name: np.asarray(array, float).reshape(N, 1) for name, array in channels.items()}
     return Trace(TIME, values, (np.arange(N) < alive).reshape(N, 1), (reason,))
 
@@ -85,6 +86,44 @@ def test_activity_is_the_rate_of_the_command():
     assert found("intervention_time", made(intervention=np.where(TIME < 12.0, -0.01, 0.0))) == pytest.approx(0.1, 1e-2)
 
 
+def test_exceedances_are_of_any_kind_and_counted_once():
+    slow, steep = TIME < 12.0, (TIME > 6.0) & (TIME < 18.0)
+    t = made(stall_speed=np.where(slow, 80.0, 40.0), bank=np.where(steep, -1.2, 0.1))
+    assert found("exceedances", t) == pytest.approx(18.0/120.1, abs=1e-3)
+    assert found("exceedances", made(load_factor=np.where(TIME < 6.0, 4.0, 1.0))) == pytest.approx(0.05, abs=1e-3)
+    assert found("exceedances", made()) == 0.0
+
+
+def test_nuisance_is_counted_where_there_is_no_ice():
+    moved = np.where((TIME > 30.0) & (TIME < 90.0), 0.01, 0.0)
+    t = made(intervention=moved, excess_drag=np.where(TIME > 60.0, 0.03, 0.0))
+    assert found("nuisance_time", t) == pytest.approx(0.5, abs=0.01)
+    assert np.isnan(found("nuisance_time", made(intervention=moved, excess_drag=np.full(N, 0.03))))
+    assert found("intervention_time", made(intervention_aileron=moved)) == pytest.approx(0.5, abs=0.01)
+
+
+def test_overshoot_and_settling_of_a_step():
+    since = np.maximum(TIME - 10.0, 0.0)
+    error = 30.0*np.exp(-since/5.0)*np.cos(since/4.0)*(TIME > 10.0)  # m
+    t = made(altitude_error=error)
+    assert np.isnan(found("altitude_overshoot", t))
+    t = Trace(t.time, t.values, t.alive, t.reason, stepped=True)
+    after = np.linspace(0.0, 40.0, 40001)
+    answer = np.exp(-after/5.0)*np.cos(after/4.0)
+    assert found("altitude_overshoot", t) == pytest.approx(-answer.min(), abs=1e-3)
+    assert found("altitude_settling", t) == pytest.approx(after[np.abs(answer) > 0.1].max(), abs=0.11)
+    assert found("heading_overshoot", t) == 0.0
+
+
+def test_a_learned_controller_is_judged_over_its_training_seeds():
+    runs = [{name: np.array([float(k), float(k), np.nan]) for name in metrics.METRICS} for k in (1, 2, 3)]
+    told = metrics.summary(runs, learned=True)["altitude_rms"]
+    assert told["mean"] == 2.0 and told["training_seeds"] == 3 and told["episodes"] == 6
+    assert told["high95"] - told["mean"] == pytest.approx(4.302653/np.sqrt(3.0), rel=1e-5)
+    assert told["iqm"] == pytest.approx(2.0)
+    assert "iqm" not in metrics.summary(runs[:1], learned=False)["altitude_rms"]
+
+
 def test_intervals():
     mean, low, high = metrics.interval(np.array([1.0, 2.0, 3.0, 4.0]), share=False)
     assert mean == 2.5 and high - mean == pytest.approx(3.182446*1.290994/2.0, rel=1e-5) and mean - low == high - mean
@@ -127,7 +166,8 @@ def test_the_answer_has_its_form_and_is_repeatable(tmp_path: Path):
     protected, bare = first["rows"]
     assert protected["protection"] and not bare["protection"]
     assert bare["metrics"]["false_alarms"]["mean"] is None and bare["metrics"]["boot_cycles"]["mean"] == 0.0
-    assert json.dumps(first, allow_nan=False) == json.dumps(compare(suite.load(path), ["autopilot"], seed=3))
+    assert json.dumps(first, allow_nan=False) == json.dumps(compare(suite.load(path), ["autopilot"], seed=3,
+                                                                     workers=2))
 
 
 @pytest.mark.parametrize("name", suite.names())

@@ -1,0 +1,52 @@
+"""One metric of every controller in every case, as dots with intervals."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from testbed.comparison.overview import Rows
+from testbed.plot_style import GREY, ROLES, legend_above, styled
+
+COLUMNS = 4
+SHOWN = {True: ("protected", "o"), False: ("unprotected", "D")}  # role and marker
+
+
+@styled
+def by_case(rows: Rows, name: str) -> Figure:
+    """Mean and 95 % interval of a metric: a panel per case, a line per controller, protected and not.
+
+    Kinds of controller are parted by grey lines; a controller without a value in a case leaves its line empty.
+    """
+    cases = list(dict.fromkeys((row["scenario"], row["turbulence"]) for row in rows))
+    kinds = dict.fromkeys((row["controller"], row["kind"]) for row in rows)
+    order = sorted(kinds, key=lambda pair: ("classical", "adaptive", "learned", "oracle").index(pair[1]))
+    place = {controller: k for k, (controller, _) in enumerate(order)}
+    columns = min(COLUMNS, len(cases))
+    lines = math.ceil(len(cases)/columns)
+    figure = Figure(figsize=(11.0, 0.8 + lines*(0.6 + 0.19*len(order))), layout="constrained")
+    panels = list(figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).flat)
+    for axes, case in zip(panels, cases, strict=False):
+        for row in rows:
+            metric = row["metrics"][name]
+            if (row["scenario"], row["turbulence"]) != case or metric["mean"] is None:
+                continue
+            role, marker = SHOWN[row["protection"]]
+            y = place[row["controller"]] + (-0.17 if row["protection"] else 0.17)
+            spread = np.array([[metric["mean"] - metric["low95"]], [metric["high95"] - metric["mean"]]])
+            axes.errorbar([metric["mean"]], [y], xerr=np.maximum(spread, 0.0), fmt=marker, markersize=3.5,
+                          color=ROLES[role]["color"], linewidth=1.0, label=role)
+        for k in range(1, len(order)):
+            if order[k][1] != order[k - 1][1]:
+                axes.axhline(k - 0.5, color=GREY, linewidth=0.8)
+        axes.set_title(f"{case[0].replace('_', ' ')}, {case[1]}", fontsize=8.5)
+        axes.set_yticks(range(len(order)), [controller for controller, _ in order], fontsize=7.5)
+        axes.set_ylim(len(order) - 0.5, -0.5)
+    for axes in panels[len(cases):]:
+        axes.set_visible(False)
+    unit = rows[0]["metrics"][name]["unit"]
+    figure.supxlabel(name.replace("_", " ") + ("" if unit == "1" else f" ({unit})"), fontsize=9.5)
+    legend_above(figure, panels[:len(cases)])
+    return figure

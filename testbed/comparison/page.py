@@ -1,0 +1,65 @@
+"""The report of `icing compare --out`: verdicts, one overview, and every case by function of the ice management."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from testbed.comparison.figures import by_case
+from testbed.comparison.overview import FUNCTIONS, Rows, names_of, overview, sentences
+from testbed.files import write_whole
+from testbed.report import Cell, Report
+
+OPENING = """
+Every controller flies the same drawn cases: same seeds, weather, ice and starting conditions, with ice management and
+envelope protection and without. Means with 95 % intervals over episodes; for learned controllers over training seeds,
+with the interquartile mean beside. Truth is used for scores only.
+"""
+KEY = {1: ("detection_delay", "severity_error"), 2: ("ice_carried", "boot_cycles"),
+       3: ("losses", "stalled", "exceedances", "worst_alpha_margin"),
+       4: ("altitude_rms", "heading_rms", "elevator_activity")}  # fmt: skip
+
+
+def write(result: Mapping[str, Any], provenance: Mapping[str, str], folder: Path) -> Path:
+    """Write `compare.html` and `compare.json` into `folder`, each whole or not at all; returns the page's path."""
+    rows: Rows = result["rows"]
+    report = Report("Controllers in icing", f"Suite {result['suite']}, {result['episodes']} episodes a case.",
+                    provenance)
+    report.section("What it shows", OPENING)
+    for text, kind in sentences(rows):
+        report.verdict(text, kind)
+    for function, title in FUNCTIONS.items():
+        _function(report, rows, function, title)
+    write_whole(folder/"compare.json", json.dumps(result, allow_nan=False, indent=1))
+    return report.write(folder/"compare.html")
+
+
+def _function(report: Report, rows: Rows, function: int, title: str) -> None:
+    names = names_of(rows, function)
+    report.section(title[2:].capitalize())
+    report.table(("controller", "kind", "protection", *(_head(rows, n) for n in names)),
+                 [(one["controller"], one["kind"], "on" if one["protection"] else "off",
+                   *(one["metrics"][n][0] for n in names)) for one in overview(rows)],
+                 "Means over all cases.")
+    for name in KEY[function]:
+        if any(row["metrics"][name]["mean"] is not None for row in rows):
+            report.figure(by_case(rows, name), f"{_head(rows, name)} by case, with 95 % intervals.",
+                          f"{name} of every controller in every case, protected and unprotected")
+    report.table(("scenario", "gusts", "controller", "protection", *(_head(rows, n) for n in names)),
+                 [(row["scenario"], row["turbulence"], row["controller"], "on" if row["protection"] else "off",
+                   *(_cell(row["metrics"][n]) for n in names)) for row in rows
+                  if any(row["metrics"][n]["mean"] is not None for n in names)],
+                 "Every case: mean and, in brackets, the 95 % interval.")
+
+
+def _head(rows: Rows, name: str) -> str:
+    unit = rows[0]["metrics"][name]["unit"]
+    return name.replace("_", " ") + ("" if unit == "1" else f" ({unit})")
+
+
+def _cell(metric: Mapping[str, Any]) -> Cell:
+    if metric["mean"] is None:
+        return None
+    return f"{metric['mean']:.3g} ({metric['low95']:.2g} to {metric['high95']:.2g})"
