@@ -280,7 +280,8 @@ ADVISORY_FIELDS: list[Field] = [
     ("adaptation_frozen", "0/1", "the estimate is too poor: the adaptation stays where it is"),
 ]
 ESTIMATE = structured(ESTIMATE_FIELDS)
-ADVISORY = structured(ADVISORY_FIELDS, ("memory", "f8"), ("since_detection", "f8"))
+ADVISORY = structured(ADVISORY_FIELDS, *((memory, "f8") for memory in ("memory", "since_detection", "alpha_slow",
+                      "alpha_energy", "tail_share", "wing_share", "roll_slow", "roll_model", "climb_spare")))
 
 # What an autopilot is to hold.
 TARGET_FIELDS: list[Field] = [
