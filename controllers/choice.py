@@ -24,6 +24,7 @@ class Choice:
 
 LAWS: dict[str, Choice] = {
     "autopilot": Choice("controllers.laws.autopilot", "cascaded PID: attitude, altitude, speed and heading holds"),
+    "sis": Choice("controllers.laws.sis", "the Smart Icing System's published attitude and heading holds"),
 }
 PROTECTIONS: dict[str, Choice] = {
     "surfaces": Choice("controllers.protection.surfaces", "surfaces kept within what the limits allow"),

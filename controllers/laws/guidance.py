@@ -165,16 +165,22 @@ def hold_airspeed(a: Any, c: Any, m: Any, t: Any, adv: Any, g: Any, climb: float
 
 
 @kernel
-def command_bank(a: Any, m: Any, t: Any, adv: Any, g: Any, dt: float) -> bool:
-    """Move the bank asked for towards the target, within the limits; True once it is there."""
-    wanted = t.phi
-    if t.roll_mode == 1.0:
-        wanted = math.atan(airspeed_of(m)*g.K_heading*wrapped(t.heading - m.psi)/G0)
+def slew_bank(a: Any, wanted: float, adv: Any, g: Any, dt: float) -> bool:
+    """Move the bank asked for towards `wanted` [rad], within the limits; True once it is there."""
     limit = max(min(g.bank_max, adv.bank_limit), 0.0)
     left = clip(wanted, -limit, limit) - a.bank_command
     slew = g.bank_rate*dt
     a.bank_command += clip(left, -slew, slew)
     return abs(left) <= slew
+
+
+@kernel
+def command_bank(a: Any, m: Any, t: Any, adv: Any, g: Any, dt: float) -> bool:
+    """Move the bank asked for towards the target, within the limits; True once it is there."""
+    wanted = t.phi
+    if t.roll_mode == 1.0:
+        wanted = math.atan(airspeed_of(m)*g.K_heading*wrapped(t.heading - m.psi)/G0)
+    return slew_bank(a, wanted, adv, g, dt)
 
 
 @kernel
