@@ -6,13 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers import ice_management
-from icing_env.types import COMMAND, ESTIMATE, MEASUREMENT, TARGET, structured
+from icing_env import aircraft
+from icing_env.types import COMMAND, ESTIMATE, MEASUREMENT, TARGET
 
-# Clean DHC-6: UIUC/FDC derivatives, geometry and mass of the 2002 flight records, onset of separation as assumed.
-TWIN_OTTER = {
-    "wing_area": 39.25, "mass": 4951.0, "alpha_stall": 0.2, "CZ_0": -0.36, "CZ_alpha": -5.66, "CX_0": -0.0488,
-    "Cm_0": 0.04, "Cm_alpha": -1.31, "Cm_elevator": -1.74,
-}
 BOUNDS = {
     "airspeed": (0.0, 120.0), "alpha": (-0.5, 0.7), "beta": (-0.5, 0.5), "p": (-2.0, 2.0), "q": (-1.0, 1.0),
     "r": (-1.0, 1.0), "phi": (-np.pi, np.pi), "theta": (-1.57, 1.57), "psi": (-50.0, 50.0), "ax": (-20.0, 20.0),
@@ -23,11 +19,8 @@ BOUNDS = {
 
 
 def airframe() -> NDArray:
-    """One row with what ice management and protection know of the clean aircraft."""
-    row = np.zeros(1, structured([(name, "", "") for name in TWIN_OTTER]))
-    for name, value in TWIN_OTTER.items():
-        row[name] = value
-    return row
+    """One row with what ice management, protection and laws know of the clean aircraft."""
+    return aircraft.load("twin_otter")
 
 
 def cruise(n: int = 1) -> NDArray:

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.ice_management.limits import limit_envelope, limit_flap
+from controllers.ice_management.limits import limit_envelope
 from controllers.ice_management.operate import operate_protection
 from controllers.ice_management.sense import characterise
+from controllers.ice_management.upsets import limit_flap, sense_upsets
 from icing_env.jit import entry
 from icing_env.types import ADVISORY
 
@@ -22,8 +23,9 @@ from icing_env.types import ADVISORY
 def init(n: int) -> NDArray[Any]:
     """Advisories for `n` aircraft before the first step: no ice, nothing limited (ADVISORY rows)."""
     advisory = np.zeros(n, ADVISORY)
-    for name in ("alpha_limit", "bank_limit", "flap_limit"):
+    for name in ("alpha_limit", "bank_limit", "flap_limit", "pitch_limit"):
         advisory[name] = 0.5 * math.pi
+    advisory["load_factor_limit"] = 10.0  # beyond any structure
     return advisory
 
 
@@ -53,5 +55,6 @@ def step(
         g = tuning[i if len(tuning) > 1 else 0]
         characterise(a, e, frame, g, dt)
         operate_protection(a, m, g)
-        limit_envelope(a, m, frame, g)
-        limit_flap(a, e, frame, g)
+        sense_upsets(a, m, frame, g, dt)
+        limit_envelope(a, m, e, frame, g, dt)
+        limit_flap(a, m, e, frame, g)
