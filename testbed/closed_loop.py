@@ -1,7 +1,8 @@
 """The composition root of flight: observer, ice management, autopilot and protection around the aircraft.
 
-Order within a step: steer (autopilot), protect (ice protection, then limits), fly, observe (estimator, ice management).
-Everyone sees measurements, estimates and the clean aircraft's numbers; nobody sees the truth.
+Order within a step: steer (autopilot), protect (adaptation, ice protection, then limits), fly, observe (estimator, ice
+management). Everyone sees measurements, estimates and the clean aircraft's numbers; nobody sees the truth but the
+oracle, which the testbed alone can choose and must show its fleet.
 """
 
 from __future__ import annotations
@@ -12,11 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers import choice, ice_management
+from controllers.ice_management import adapt
 from estimators.airframe import airframe_from
 from estimators.observer.choice import observer as observer_named
 from estimators.observer.layout import PARAMETER_NAMES
+from icing_env.errors import InputError, nearest
 from icing_env.jit import bound
+from icing_env.simulate import Fleet
 from icing_env.types import ESTIMATE, ESTIMATED_NAMES, TARGET
+from testbed.oracle import Oracle
+from testbed.sensing import SENSES, Characteriser
 
 
 class ClosedLoop:
@@ -30,27 +36,45 @@ class ClosedLoop:
         management: find ice, move the limits, and operate ice protection where `boots` says so.
         protection: limit commands to the limits.
         boots: let the ice management switch boots and propeller heat.
-        estimator: which observer, by its name in `estimators.observer.choice`.
+        estimator: which observer, by its name in `estimators.observer.choice`, or "oracle": the truth (`reveal`).
         law: who steers, by its name in `controllers.choice.LAWS`.
         shield: how limits are kept, by its name in `controllers.choice.PROTECTIONS`.
+        sense: how the ice management finds ice, one of `testbed.sensing.SENSES`; the oracle knows.
+        adaptation: between the law and the protection, keep the flying qualities of the clean aircraft.
+        reference: features of each aircraft's own clean flight, for the characteriser.
     """
 
     def __init__(self, n: int, clean: NDArray, dt: float, *, observer: bool = True, management: bool = True,
                  protection: bool = True, boots: bool = True, estimator: str = "hinf", law: str = "autopilot",
-                 shield: str = "surfaces") -> None:
-        self.dt, self.clean = dt, clean[:1].copy()
-        self.observing, self.managing, self.protecting, self.boots = observer, management, protection, boots
+                 shield: str = "surfaces", sense: str = "drag", adaptation: bool = False,
+                 reference: NDArray | None = None) -> None:
+        self.dt, self.clean, knows = dt, clean[:1].copy(), estimator == "oracle"
+        self.observing, self.managing = observer and not knows, management
+        self.protecting, self.boots, self.adapting = protection, boots, adaptation
         self.airframe = airframe_from(self.clean)
-        chosen = observer_named(estimator)
+        chosen = observer_named("hinf" if knows else estimator)
         self._step, self.tuning = chosen.step, chosen.default_tuning()
         self._law, self._shield = choice.law(law), choice.protection(shield)
         self.gains, self.shield_tuning = self._law.default_gains(), self._shield.load_tuning()
-        self.management_tuning = ice_management.load_tuning()
+        self.management_tuning, self.adaptation_tuning = ice_management.load_tuning(), adapt.load_tuning()
         self.target = np.zeros(n, TARGET)
         self._fresh_observer = chosen.init(self.airframe, self.tuning, 1)
         self._fresh_estimate = clean_estimate(self._fresh_observer)
         self.observer, self.estimate = np.repeat(self._fresh_observer, n), np.repeat(self._fresh_estimate, n)
         self.advisory, self.law, self.shield = ice_management.init(n), self._law.init(n), self._shield.init(n)
+        self.adaptation = adapt.init(n)
+        self.informant = self._informant(n, sense, knows, reference)
+
+    def _informant(self, n: int, sense: str, knows: bool, reference: NDArray | None) -> Oracle | Characteriser | None:
+        """Who tells the ice management the ice surface by surface, if anybody does."""
+        if sense not in SENSES:
+            raise InputError(f"no way to sense ice '{sense}': {nearest(sense, list(SENSES))}")
+        about = (self.estimate, self.advisory, self.management_tuning)
+        if knows:
+            return Oracle(self.clean, self.dt, *about)
+        if sense == "characterise" and self.managing:
+            return Characteriser(n, self.clean, self.dt, *about, reference)
+        return None
 
     def attach(self, measurement: NDArray, command: NDArray) -> None:
         """Bind every part to the arrays it works on."""
@@ -64,12 +88,24 @@ class ClosedLoop:
         self._operate = bound(ice_management.operate, command, advisory)
         self._protect = bound(self._shield.protect, self.shield, command, advisory, measurement, estimate, self.clean,
                               self.shield_tuning, dt)
+        if self.adapting:
+            self._adapt = bound(adapt.adapt, self.adaptation, command, measurement, estimate, advisory, self.clean,
+                                self.adaptation_tuning, dt)
+        if isinstance(self.informant, Characteriser):
+            self.informant.attach(measurement, command)
+
+    def reveal(self, fleet: Fleet) -> None:
+        """Show the fleet to the oracle; to anybody else, nothing."""
+        if isinstance(self.informant, Oracle):
+            self.informant.reveal(fleet)
 
     def reset(self, rows: NDArray) -> None:
         """Begin anew: a clean aircraft is believed, nothing is limited beyond the clean limits."""
         self.observer[rows], self.estimate[rows] = self._fresh_observer, self._fresh_estimate
-        self.advisory[rows] = ice_management.init(1)
+        self.advisory[rows], self.adaptation[rows] = ice_management.init(1), adapt.init(1)
         self.law[rows], self.shield[rows] = self._law.init(1), self._shield.init(1)
+        if self.informant is not None:
+            self.informant.reset(rows)
         if self.managing:
             advisory = self.advisory[rows]
             ice_management.step(advisory, self.estimate[rows], self.measurement[rows], self.clean,
@@ -80,6 +116,8 @@ class ClosedLoop:
         """Estimate from the measurement, then judge the ice."""
         if self.observing:
             self._estimate()
+        if self.informant is not None:
+            self.informant.observe()
         if self.managing:
             self._manage()
 
@@ -91,7 +129,9 @@ class ClosedLoop:
         self._steer()
 
     def protect(self) -> None:
-        """Switch boots and heat, then limit the command."""
+        """Adapt the command to the aircraft as it is, switch boots and heat, then limit the command."""
+        if self.adapting:
+            self._adapt()
         if self.managing and self.boots:
             self._operate()
         if self.protecting:
@@ -99,8 +139,10 @@ class ClosedLoop:
 
     def memory(self) -> dict[str, NDArray]:
         """Everything that must be kept to go on later."""
+        told = {} if self.informant is None else self.informant.memory()
         return {"estimate": self.estimate, "advisory": self.advisory, "target": self.target,
-                "observer": self.observer, "law": self.law, "shield": self.shield}
+                "observer": self.observer, "law": self.law, "shield": self.shield, "adaptation": self.adaptation,
+                **told}
 
 
 def clean_estimate(memory: NDArray) -> NDArray:

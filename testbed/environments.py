@@ -10,10 +10,11 @@ from icing_env.env import TwinOtterEnv
 from icing_env.jit import compile_beside
 from icing_env.loop import LoopFactory, NoLoop
 from icing_env.vector_env import TwinOtterVectorEnv
+from icing_env.world import World
 from testbed.closed_loop import ClosedLoop
 
 PARTS = ("observer", "management", "protection", "boots")  # each on or off
-CHOICES = ("estimator", "law", "shield")  # each by name
+CHOICES = ("estimator", "law", "shield", "sense", "adaptation")  # which of each
 
 
 def loop_factory(**options: Any) -> LoopFactory:
@@ -23,6 +24,13 @@ def loop_factory(**options: Any) -> LoopFactory:
         return ClosedLoop(n, clean, dt, **options)
 
     return make_loop
+
+
+def reveal(world: World) -> World:
+    """Show the truth to a loop whose estimator is the oracle; others never see it. Returns the world."""
+    if isinstance(world.loop, ClosedLoop):
+        world.loop.reveal(world.fleet)
+    return world
 
 
 def _loop(options: dict[str, Any]) -> LoopFactory:

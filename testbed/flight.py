@@ -20,7 +20,8 @@ from icing_env.scenario import Scenario
 from icing_env.tasks import REASONS
 from icing_env.types import CURRENT_FIELDS, MEASUREMENT_FIELDS, OUTCOME_FIELDS, SURFACES
 from icing_env.world import World
-from testbed.environments import loop_factory
+from testbed.environments import loop_factory, reveal
+from testbed.oracle import quasi_steady, zero_lift_drag
 
 COMMANDS = ("elevator", "aileron", "rudder")
 SWITCHES = ("boots_wing", "boots_tail", "boots_vtail_struts", "prop_heat")
@@ -38,6 +39,9 @@ class Controller:
     kind: str  # classical, adaptive, learned, oracle
     law: str | None  # of controllers.choice.LAWS, flies the task; None: the controls stay where the trim put them
     episodes: int = 1_000_000  # most that a comparison flies; fewer for a controller that takes long
+    adaptation: bool = False  # between the law and the protection: clean-like flying qualities from the estimate
+    estimator: str = "hinf"  # of estimators.observer.choice, or "oracle"
+    sense: str = "drag"  # of testbed.sensing.SENSES
 
     @property
     def members(self) -> tuple[str, ...]:
@@ -47,6 +51,10 @@ class Controller:
 
 CONTROLLERS = {name: Controller(name, law.description, law.kind, name) for name, law in LAWS.items()} | {
     "hands_off": Controller("hands_off", "controls held at the trim", "classical", None),
+    "adapted": Controller("adapted", "autopilot, control laws adapted by the H-infinity estimate", "adaptive",
+                          "autopilot", adaptation=True),
+    "oracle": Controller("oracle", "autopilot, adapted and protected by one who knows the true ice", "oracle",
+                         "autopilot", adaptation=True, estimator="oracle"),
 }
 
 
@@ -76,13 +84,27 @@ def controller(name: str) -> Controller:
 
 
 def make_world(scenario: Scenario, n: int = 1, who: str = "autopilot", protection: bool = True,
-               observer: bool = True, threads: int = 1) -> World:
-    """World in which a controller flies a scenario, with or without ice management and protection."""
+               observer: bool = True, threads: int = 1, *, law: str | None = None, shield: str = "surfaces",
+               sense: str | None = None, adaptation: bool | None = None, estimator: str | None = None) -> World:
+    """World in which a controller flies a scenario, with or without ice management and protection.
+
+    Args:
+        scenario, n, threads: as in `World`.
+        who: name in CONTROLLERS.
+        protection: ice management and envelope protection on.
+        observer: estimator in the loop.
+        law, sense, adaptation, estimator: instead of the controller's own.
+        shield: how limits are kept, by its name in `controllers.choice.PROTECTIONS`.
+    """
     pilot = controller(who)
     boots = scenario.ice_protection == "management"
+    chosen = estimator or pilot.estimator
     loop = loop_factory(observer=observer, management=protection, protection=protection, boots=boots and protection,
-                        law=pilot.law or "autopilot")
-    return World(scenario, n, loop, mode="surfaces" if pilot.law is None else None, threads=threads)
+                        law=law or pilot.law or "autopilot", shield=shield, sense=sense or pilot.sense,
+                        adaptation=pilot.adaptation if adaptation is None else adaptation, estimator=chosen)
+    world = World(scenario, n, loop, mode="surfaces" if pilot.law is None and law is None else None, threads=threads)
+    reveal(world)
+    return world
 
 
 def fly(scenario: Scenario, who: str = "autopilot", seed: int = 0, *, protection: bool = True, observer: bool = True,
@@ -188,30 +210,3 @@ def _truth(kept: dict[str, NDArray[Any]], world: World) -> dict[str, NDArray[np.
     out["excess_CD_0"] = out["quasi_CD_0"] - zero_lift_drag(clean) - clean["CD_parasite"]
     return out
 
-
-def zero_lift_drag(c: Any) -> Any:
-    """Drag coefficient at zero lift of the body-axis set (arrays or numbers by name)."""
-    alpha = c["CZ_0"]/(c["CX_0"] - c["CZ_alpha"])
-    return -(c["CX_0"] + alpha*(c["CX_alpha"] + alpha*c["CX_alpha2"]))/np.cos(alpha)
-
-
-def quasi_steady(truth: dict[str, NDArray[np.float64]], p: Any) -> dict[str, NDArray[np.float64]]:
-    """What a regression without a downwash lag should find: the quasi-steady equivalent derivatives.
-
-    The lag adds Cm_alphadot (c/2V) alpha_dot with alpha_dot = q + (rho S V/2m)(CZ_alpha alpha + CZ_q qhat + ...), so
-    that each moment derivative gains Cm_alphadot (rho S c/4m) times its lift derivative; the lag's next term goes with
-    alpha_ddot, nearly q_dot, and divides them by 1 + M_alphadot l_t/V = 1 + Cm_alphadot rho S c^2 l_t/(4 Iyy).
-    CL_alpha at alpha = 0 is CX_0 - CZ_alpha. CD_0 is the drag at zero lift. (Etkin & Reid, Dynamics of Flight, 3rd ed.,
-    section 5.5.)
-    """
-    lag = p["Cm_alphadot"]*truth["density"]*p["wing_area"]*p["chord"]/(4.0*truth["mass"])
-    inertia = 1.0 + p["Cm_alphadot"]*truth["density"]*p["wing_area"]*p["chord"]**2*p["tail_arm"]/(4.0*p["inertia_yy"])
-    drag = zero_lift_drag(truth) + truth["CD_parasite"]
-    return {
-        "quasi_CL_alpha": truth["CX_0"] - truth["CZ_alpha"],
-        "quasi_CL_elevator": -truth["CZ_elevator"],
-        "quasi_CD_0": drag,
-        "quasi_Cm_alpha": (truth["Cm_alpha"] + lag*truth["CZ_alpha"])/inertia,
-        "quasi_Cm_q": (truth["Cm_q"] + lag*truth["CZ_q"])/inertia,
-        "quasi_Cm_elevator": (truth["Cm_elevator"] + lag*truth["CZ_elevator"])/inertia,
-    }

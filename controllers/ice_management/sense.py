@@ -3,6 +3,8 @@
 * severity: inverse-variance mean of the severities that excess drag and, where elevator inputs have excited them, the
   losses of CL_alpha, Cm_alpha and Cm_elevator speak for. Drag comes first because its scatter is the smallest part of
   its icing effect (founding paper: excess drag follows icing above 80 %); the fleet scatter in each variance says so.
+* instead, where somebody else has told the ice surface by surface (`tell`): severity is that of the worst of wings and
+  tailplane, by the probability that the ice matters
 * detection: confirmed after a time above a threshold, released after a time below a lower one (hysteresis), by one
   counter that runs up and down
 """
@@ -12,8 +14,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from controllers.kernels import clip
 from icing_env.jit import kernel
+from icing_env.types import SENSED_PARTS
 
 
 @kernel
@@ -47,6 +53,9 @@ def assess(e: Any, frame: Any, g: Any) -> tuple[float, float]:
 @kernel
 def characterise(a: Any, e: Any, frame: Any, g: Any, dt: float) -> None:
     """Severity, confidence and detection. An unhealthy or undefined estimate changes the confidence only."""
+    if a.told == 1.0:
+        a.since_detection = (a.since_detection + dt)*a.ice_detected
+        return
     severity, confidence = assess(e, frame, g)
     if e.health != 1.0 or not (math.isfinite(severity) and math.isfinite(confidence)):
         a.confidence = 0.0
@@ -63,3 +72,25 @@ def characterise(a: Any, e: Any, frame: Any, g: Any, dt: float) -> None:
     elif a.memory <= 0.0:
         a.ice_detected = 0.0
     a.since_detection = (a.since_detection + dt)*a.ice_detected
+
+
+def tell(advisory: NDArray[Any], eta: NDArray[np.float64], sure: NDArray[np.float64], detected: NDArray[np.bool_],
+         failed: NDArray[np.bool_], tuning: NDArray[Any]) -> None:
+    """Take the ice surface by surface from somebody else, in place; from then on drag alone decides nothing.
+
+    Args:
+        advisory: ADVISORY rows [n].
+        eta: severity of each of SENSED_PARTS [n, 4].
+        sure: probability that the ice matters [n].
+        detected: ice is believed [n].
+        failed: protection of each part is believed to have failed [n, 4].
+        tuning: one IMS_TUNING row.
+    """
+    advisory["told"] = 1.0
+    for i, part in enumerate(SENSED_PARTS):
+        advisory[f"severity_{part}"] = np.maximum(eta[:, i], 0.0)
+        advisory[f"failed_{part}"] = failed[:, i]
+    worst = eta[:, :3].max(axis=1)/tuning["eta_severe"][0]
+    advisory["severity"] = np.clip(sure*worst, 0.0, 1.0)
+    advisory["confidence"] = np.abs(2.0*sure - 1.0)
+    advisory["ice_detected"] = detected

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +57,7 @@ class Memory:
     referenced: NDArray[np.bool_]
     judged: Judgement
     on: NDArray[np.bool_]
-    clock: float = 0.0
+    clock: FloatArray = field(default_factory=lambda: np.zeros(1))  # s since the last judgement
 
 
 def load(rival: str = "network", where: Path | None = None) -> Character:
@@ -80,6 +80,27 @@ def refer(memory: Memory, reference: FloatArray, rows: slice | NDArray = slice(N
     memory.offset[rows], memory.referenced[rows] = offset_of(np.asarray(reference)), True
 
 
+def reset(memory: Memory, severity: NDArray[np.void], rows: NDArray) -> None:
+    """Let `rows` (indices) begin anew, in place; what they were told of their own clean flight (`refer`) is forgotten.
+
+    The clock is common to all: a row that begins between judgements is judged with the others.
+    """
+    fresh, said = init(len(rows))
+    was, new = arrays(memory), arrays(fresh)
+    for name, array in was.items():
+        if name != "clock":
+            array[rows] = new[name]
+    severity[rows] = said
+
+
+def arrays(memory: Memory) -> dict[str, NDArray[Any]]:
+    """Every array of a memory by name: views, to be kept and written back."""
+    judged = memory.judged
+    return {"evidence": memory.evidence, "watch": memory.watch, "offset": memory.offset,
+            "referenced": memory.referenced, "on": memory.on, "clock": memory.clock, "classes": judged.classes,
+            "iced": judged.iced, "eta": judged.eta, "std": judged.std}
+
+
 def step(memory: Memory, severity: NDArray[np.void], estimate: NDArray[Any], measurement: NDArray[Any],
          switches: NDArray[Any], clean: NDArray[np.void], character: Character, dt: float) -> None:
     """Advance every aircraft by one sample, in place.
@@ -98,7 +119,7 @@ def step(memory: Memory, severity: NDArray[np.void], estimate: NDArray[Any], mea
     for i, name in enumerate(SWITCHES):
         memory.on[:, i] |= switches[name] > 0.5
     memory.clock += dt
-    if memory.clock < tuning.period - 0.5*dt:
+    if memory.clock[0] < tuning.period - 0.5*dt:
         return
     memory.clock -= tuning.period
     now = np.asarray(measurement["time"], np.float64)

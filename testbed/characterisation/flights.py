@@ -20,6 +20,7 @@ from icing_env import aircraft, scenario
 from icing_env.types import DERIVATIVE_NAMES, SURFACES
 from icing_env.world import World
 from testbed.environments import loop_factory
+from testbed.oracle import zero_lift_drag
 
 FloatArray = NDArray[np.float64]
 SPREAD = 0.05  # of each derivative about its published value: uniform (assumed)
@@ -154,8 +155,6 @@ def fly(plan: Plan, seed: int, threads: int = 2) -> Flown:
 
 def truth_of(world: World) -> tuple[FloatArray, FloatArray]:
     """Excess drag at zero lift and lost share of CL_alpha [n], against each aircraft's own clean numbers."""
-    from testbed.flight import zero_lift_drag
-
     now, own = world.fleet.current, world.fleet.parameters
     drag = zero_lift_drag(now) + now["CD_parasite"] - zero_lift_drag(own) - own["CD_parasite"]
     return drag, 1.0 - (now["CX_0"] - now["CZ_alpha"])/(own["CX_0"] - own["CZ_alpha"])

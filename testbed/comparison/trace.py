@@ -14,7 +14,7 @@ from icing_env.atmosphere import G0, GAS_CONSTANT
 from icing_env.tasks import REASONS
 from icing_env.types import SURFACES
 from icing_env.world import World
-from testbed.flight import quasi_steady
+from testbed.oracle import quasi_steady
 
 FloatArray = NDArray[np.float64]
 COEFFICIENTS = ("CX_0", "CX_alpha", "CX_alpha2", "CZ_0", "CZ_alpha", "CZ_q", "CZ_elevator", "Cm_alpha", "Cm_q",
