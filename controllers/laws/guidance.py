@@ -136,6 +136,12 @@ def climb_command(a: Any, t: Any, adv: Any, g: Any, dt: float) -> float:
 
 
 @kernel
+def turn_alpha(m: Any, g: Any, scale: float) -> float:
+    """Angle of attack [rad] that the level turn at this bank needs beyond level flight."""
+    return g.K_turn*scale*(1.0/max(math.cos(m.phi), 0.5) - 1.0)
+
+
+@kernel
 def pitch_command(a: Any, m: Any, t: Any, adv: Any, g: Any, climb: float, scale: float, dt: float) -> float:
     """Pitch angle asked for [rad], limited by the advised angle of attack."""
     low, high = g.theta_min, g.theta_max
@@ -144,8 +150,7 @@ def pitch_command(a: Any, m: Any, t: Any, adv: Any, g: Any, climb: float, scale:
         a.pitch_trim = m.theta
         return clip(t.theta, low, ceiling)
     error = (climb - a.climb_rate)/airspeed_of(m)
-    load = 1.0/max(math.cos(m.phi), 0.5) - 1.0
-    wanted = a.pitch_trim + g.K_climb*error + g.K_turn*scale*load
+    wanted = a.pitch_trim + g.K_climb*error + turn_alpha(m, g, scale)
     a.pitch_trim = integrated(a.pitch_trim, g.K_climb_integral*error*dt, wanted, low, ceiling)
     return clip(wanted, low, ceiling)
 
