@@ -199,12 +199,9 @@ CURRENT_FIELDS: list[Field] = [
     ("per_stall_width", "1/rad", "1/stall_width"),
     ("per_tail_stall_width", "1/rad", "1/tail_stall_width"),
     ("per_tail_arm", "1/m", "1/tail_arm"),
-    ("per_elevator_lag", "1/s", "1/elevator_lag"),
-    ("per_aileron_lag", "1/s", "1/aileron_lag"),
-    ("per_rudder_lag", "1/s", "1/rudder_lag"),
+    *((f"per_{surface}_lag", "1/s", f"1/{surface}_lag") for surface in ("elevator", "aileron", "rudder")),
     ("per_spool_time", "1/s", "1/spool_time"),
-    ("per_elevator_stiffness", "rad/(N m)", "1/hinge_elevator_stiffness"),
-    ("per_aileron_stiffness", "rad/(N m)", "1/hinge_aileron_stiffness"),
+    *((f"per_{surface}_stiffness", "rad/(N m)", f"1/hinge_{surface}_stiffness") for surface in ("elevator", "aileron")),
 ]
 
 # The truth that tasks and scores look at, never estimators or controllers.
@@ -280,10 +277,10 @@ ADVISORY_FIELDS: list[Field] = [
     ("adaptation_frozen", "0/1", "the estimate is too poor: the adaptation stays where it is"),
 ]
 ESTIMATE = structured(ESTIMATE_FIELDS)
-ADVISORY = structured(ADVISORY_FIELDS, *((memory, "f8") for memory in ("memory", "since_detection", "alpha_slow",
-                      "alpha_energy", "tail_share", "wing_share", "roll_slow", "roll_model", "climb_spare", "told",
-                      "collected_wing", "collected_tail", "collected_struts", "collected_propeller",
-                      "shot_wing", "shot_tail", "shot_struts", "heating")))
+ADVISORY = structured(ADVISORY_FIELDS, *((memory, "f8") for memory in (
+    "memory since_detection alpha_slow alpha_energy tail_share wing_share roll_slow roll_model "
+    "climb_spare told collected_wing collected_tail collected_struts collected_propeller shot_wing "
+    "shot_tail shot_struts heating").split()))
 
 # What an autopilot is to hold.
 TARGET_FIELDS: list[Field] = [
