@@ -1,13 +1,14 @@
-"""What an action means: surfaces around the trim, or targets for the autopilot; each in [-1, 1].
+"""What an action means: surfaces around the trim, targets for the autopilot, or limits moved; each in [-1, 1].
 
-| axes         | surfaces                            | targets                        |
-|--------------|-------------------------------------|--------------------------------|
-| all          | elevator, aileron, rudder, throttle | climb rate, airspeed, bank     |
-| longitudinal | elevator, throttle                  | climb rate, airspeed           |
-| lateral      | aileron, rudder                     | bank                           |
+| axes         | surfaces                            | targets                        | limits                     |
+|--------------|-------------------------------------|--------------------------------|----------------------------|
+| all          | elevator, aileron, rudder, throttle | climb rate, airspeed, bank     | alpha, airspeed, bank      |
+| longitudinal | elevator, throttle                  | climb rate, airspeed           | alpha, airspeed            |
+| lateral      | aileron, rudder                     | bank                           | bank                       |
 
-Zero is the trimmed position at the start of the episode, or level flight at the task's airspeed. What an axis does not
-cover is flown by the autopilot on the task's references.
+Zero is the trimmed position at the start of the episode, level flight at the task's airspeed, or the limits as the ice
+management advises them. What an axis does not cover, and everything in the mode "limits", is flown by the autopilot on
+the task's references.
 """
 
 from __future__ import annotations
@@ -22,18 +23,21 @@ from icing_env.jit import entry, kernel
 from icing_env.memory import matrix, rows
 from icing_env.observation import Axes
 from icing_env.tasks import TASK
-from icing_env.types import COMMAND, TARGET
+from icing_env.types import ADVISORY, COMMAND, TARGET
 
 ACTION, COLUMN = np.dtype(np.float32), np.dtype(np.int64)
-Mode = Literal["surfaces", "targets"]
+Mode = Literal["surfaces", "targets", "limits"]
 ELEVATOR, AILERON, RUDDER, THROTTLE = 0.25, 0.29, 0.28, 1.0  # rad, rad, rad, 1: change at full action
 CLIMB_RATE, AIRSPEED, BANK = 8.0, 15.0, math.radians(45.0)  # m/s, m/s, rad at full action
+ALPHA_LIMIT, AIRSPEED_LIMIT, BANK_LIMIT = 0.05, 6.0, 0.35  # rad, m/s, rad: shift of a limit at full action
 NAMES: dict[str, tuple[str, ...]] = {
     "surfaces": ("elevator", "aileron", "rudder", "throttle"),
     "targets": ("climb_rate", "airspeed", "bank"),
+    "limits": ("alpha_limit", "airspeed_limit", "bank_limit"),
 }
 _AXIS = {"elevator": "longitudinal", "throttle": "longitudinal", "climb_rate": "longitudinal",
-         "airspeed": "longitudinal", "aileron": "lateral", "rudder": "lateral", "bank": "lateral"}
+         "airspeed": "longitudinal", "aileron": "lateral", "rudder": "lateral", "bank": "lateral",
+         "alpha_limit": "longitudinal", "airspeed_limit": "longitudinal", "bank_limit": "lateral"}
 
 
 def names(mode: Mode, axes: Axes) -> tuple[str, ...]:
@@ -116,4 +120,27 @@ def to_targets(table: Any) -> int:
             g.airspeed = k.start_airspeed + AIRSPEED*action[i, column[1]]
         if column[2] >= 0:
             g.roll_mode, g.phi = 0.0, BANK*action[i, column[2]]
+    return bad
+
+
+@entry
+def to_limits(table: Any) -> int:
+    """Advised limits of every row shifted by the action, until the ice management states them anew in its next step.
+
+    Limits that nobody has set (no lowest airspeed) stay as they are. Table: actions, columns, advisories. Returns the
+    result of `first_bad_row`.
+    """
+    action, column = actions_of(table)
+    advisory = rows(table, 2, ADVISORY)
+    bad = first_bad_row(action)
+    for i in range(len(advisory) if bad < 0 else 0):
+        a = advisory[i]
+        if a.airspeed_limit <= 0.0:
+            continue
+        if column[0] >= 0:
+            a.alpha_limit += ALPHA_LIMIT*action[i, column[0]]
+        if column[1] >= 0:
+            a.airspeed_limit += AIRSPEED_LIMIT*action[i, column[1]]
+        if column[2] >= 0:
+            a.bank_limit = max(a.bank_limit + BANK_LIMIT*action[i, column[2]], 0.0)
     return bad

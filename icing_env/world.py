@@ -35,7 +35,7 @@ class World:
         scenario: of `scenario.load`.
         n: number of aircraft.
         loop: makes what closes the loop; nobody if omitted.
-        mode: what an action means, "surfaces" or "targets"; None: the autopilot flies the task, there is no action.
+        mode: what an action means, of `actions.NAMES`; None: the autopilot flies the task, there is no action.
         axes: which axes the action covers.
         threads, dt, substeps: as in `Fleet`.
     """
@@ -76,6 +76,8 @@ class World:
         self._accept = self._overlay = None
         if mode == "targets":
             self._accept = call_at(actions.to_targets, self.action, columns, self.task, loop.target)
+        elif mode == "limits":
+            self._accept = call_at(actions.to_limits, self.action, columns, loop.advisory)
         elif mode == "surfaces":
             act = call_at(actions.to_surfaces, self.action, columns, self.trimmed, f.command)
             checked = call_at(actions.check, self.action, columns)

@@ -25,6 +25,7 @@ VERBS = {
     "benchmark": "Measure how fast the testbed is.",
     "identify": "Estimate aerodynamic derivatives from flight records.",
     "characterise": "Tell the ice on each surface, its onset, and whether protection works.",
+    "train": "Learn a controller.",
     "diagnose": "Find the effect behind a gap between model and aircraft.",
 }
 PATH_ERRORS = (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError)

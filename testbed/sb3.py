@@ -14,15 +14,25 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
-from icing_env.tasks import REASONS
+from icing_env.tasks import REASONS, REWARD_TERMS
 from testbed.environments import make_vector
+
+LENGTHS = 0x6C656E67  # sets the stream of random lengths apart from that of the episodes themselves
 
 
 class TwinOtterVecEnv(VecEnv):
-    """`num_envs` aircraft for Stable-Baselines3. Options: those of `testbed.environments.make_vector`."""
+    """`num_envs` aircraft for Stable-Baselines3.
 
-    def __init__(self, num_envs: int, **options: Any) -> None:
+    Args:
+        num_envs: number of aircraft.
+        hold: simulator steps for which an action stands; the reward is their mean.
+        shortest: episodes end after a time drawn between this [s] and the scenario's; all at that time if omitted.
+        Others: those of `testbed.environments.make_vector`.
+    """
+
+    def __init__(self, num_envs: int, *, hold: int = 1, shortest: float | None = None, **options: Any) -> None:
         self.batch = make_vector(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **options)
+        self.world, self.hold, self.shortest = self.batch.world, hold, shortest
         self.render_mode = self.batch.render_mode
         self._actions: NDArray[np.float32] = np.zeros((num_envs, *(self.batch.single_action_space.shape or ())),
                                                       np.float32)
@@ -31,29 +41,65 @@ class TwinOtterVecEnv(VecEnv):
     def reset(self) -> NDArray[np.float32]:
         """Begin new episodes everywhere; the seeds of `seed()` are used once."""
         seeds: list[int | None] = [s for s in self._seeds if s is not None]
-        observation, _ = self.batch.reset(seed=seeds if len(seeds) == self.num_envs else None)
+        self.batch.reset(seed=seeds if len(seeds) == self.num_envs else None)
+        self._draw_lengths(np.arange(self.num_envs))
         self.reset_infos = [{} for _ in range(self.num_envs)]
         self._reset_seeds()
         self._reset_options()
-        return observation
+        return self.world.observation.copy()
+
+    def _draw_lengths(self, rows: NDArray[np.int64]) -> None:
+        """Length of each new episode, from its seed and number alone: there is no generator to keep."""
+        if self.shortest is None:
+            return
+        world = self.world
+        for i in rows:
+            key = np.array([world.seed[i] ^ np.uint64(LENGTHS), world.episode[i]], np.uint64)
+            span = np.random.Generator(np.random.Philox(key=key)).uniform(self.shortest, world.scenario.duration)
+            world.task["limit"][i] = self.hold*round(span/(world.dt*self.hold))
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Keep the actions for `step_wait`."""
-        self._actions = actions
+        self._actions = np.asarray(actions, np.float32)
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
-        """Observation, reward, done and one info per aircraft, as Stable-Baselines3 lays them out."""
-        observation, reward, terminated, truncated, info = self.batch.step(self._actions)
-        done = terminated | truncated
-        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        for i in np.flatnonzero(done):
+        """Observation, reward, done and one info per aircraft, as Stable-Baselines3 lays them out.
+
+        An aircraft whose episode ends while the action stands flies on until the others have flown theirs; what it does
+        then does not count.
+        """
+        task, n = self.world.task, self.num_envs
+        reward, reason, truncated = np.zeros(n), np.zeros(n, np.int64), np.zeros(n, bool)
+        done = np.zeros(n, bool)
+        for step in range(self.hold):
+            self.world.step(self._actions if step == 0 else None)
+            reward += np.where(done, 0.0, task["reward"])
+            reason = np.where(done, reason, task["reason"].astype(np.int64))
+            truncated |= self.world.truncated & ~done
+            done = truncated | (reason > 0)
+        observation = self.world.observation.copy()
+        infos: list[dict[str, Any]] = [{} for _ in range(n)]
+        ended = np.flatnonzero(done)
+        for i in ended:
             infos[i] = {
-                "terminal_observation": info["final_obs"][i],
-                "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
-                "reason": REASONS[int(info["reason"][i])],
-                "reward_terms": {k: float(v[i]) for k, v in info["reward_terms"].items() if k[0] != "_"},
+                "terminal_observation": observation[i].copy(),
+                "TimeLimit.truncated": bool(truncated[i] and reason[i] == 0),
+                "reason": REASONS[int(reason[i])],
+                "reward_terms": {name: float(task[f"reward_{name}"][i]) for name in REWARD_TERMS},
             }
-        return observation, reward.astype(np.float32), done, infos
+        if len(ended):
+            self.world.reset(ended)
+            self._draw_lengths(ended)
+            observation[ended] = self.world.observation[ended]
+        return observation, (reward/self.hold).astype(np.float32), done, infos
+
+    def save(self) -> dict[str, NDArray[Any]]:
+        """Everything that decides how the flights go on (arrays)."""
+        return self.batch.save()
+
+    def restore(self, saved: dict[str, NDArray[Any]]) -> None:
+        """Go on from a `save`; raises InputError if it does not fit."""
+        self.batch.restore(saved)
 
     def close(self) -> None:
         """Nothing is open."""

@@ -1,0 +1,1 @@
+"""Learning to fly: Stable-Baselines3 over batches of aircraft, checkpoints without pickle, policies as safetensors."""
