@@ -26,6 +26,7 @@ LAWS: dict[str, Choice] = {
     "autopilot": Choice("controllers.laws.autopilot", "cascaded PID: attitude, altitude, speed and heading holds"),
     "sis": Choice("controllers.laws.sis", "the Smart Icing System's published attitude and heading holds"),
     "lqr": Choice("controllers.laws.lqr", "linear-quadratic regulator with integral action, scheduled"),
+    "lqg": Choice("controllers.laws.lqg", "the same regulator on a Kalman filter that keeps gusts apart"),
 }
 PROTECTIONS: dict[str, Choice] = {
     "surfaces": Choice("controllers.protection.surfaces", "surfaces kept within what the limits allow"),

@@ -95,3 +95,16 @@ def at(table: Any, where: tuple, row: int, column: int) -> float:
     near = table[i, j, row, column] + x*(table[i + 1, j, row, column] - table[i, j, row, column])
     far = table[i, j + 1, row, column] + x*(table[i + 1, j + 1, row, column] - table[i, j + 1, row, column])
     return near + y*(far - near)
+
+
+@block
+def product(table: Any, where: tuple, z: Any, out: Any) -> None:
+    """`out` becomes the table's matrix at a place of the grid times the vector that `z` begins with."""
+    i, j, x, y = where
+    for row in range(table.shape[2]):
+        total = 0.0
+        for column in range(table.shape[3]):
+            near = table[i, j, row, column] + x*(table[i + 1, j, row, column] - table[i, j, row, column])
+            far = table[i, j + 1, row, column] + x*(table[i + 1, j + 1, row, column] - table[i, j + 1, row, column])
+            total += (near + y*(far - near))*z[column]
+        out[row] = total

@@ -14,7 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from controllers.design.models import FLAPS, SHORT, SPEEDS, FloatArray, Point, clean, grid, side_force
+from controllers.design.models import (
+    DT,
+    FLAPS,
+    READ_LATERAL,
+    READ_LONGITUDINAL,
+    SHORT,
+    SPEEDS,
+    FloatArray,
+    Point,
+    clean,
+    grid,
+    side_force,
+)
 from controllers.parameters import read_parameters
 from icing_env.linearise import LATERAL
 from icing_env.types import Field
@@ -78,3 +90,19 @@ def design(parameters: NDArray[Any] | None = None) -> tuple[dict[str, FloatArray
         tables["longitudinal"][i, j] = longitudinal(point, accepted)
         tables["lateral"][i, j] = lateral(point, accepted)
     return tables, []
+
+
+def compensator(tables: dict[str, FloatArray], i: int, j: int, point: Point, axis: str) -> tuple[FloatArray, ...]:
+    """A, B, C, D from readings of one axis to its surfaces, as `controllers.laws.lqr` runs them.
+
+    States: the integrators of the surfaces. Readings: READ_LONGITUDINAL or READ_LATERAL.
+    """
+    k = tables[axis][i, j]
+    n, states = k.shape[0], 4
+    readings = READ_LONGITUDINAL if axis == "longitudinal" else READ_LATERAL
+    straight, integral = np.zeros((n, len(readings))), np.zeros((n, len(readings)))
+    straight[:, :states] = -k[:, :states]
+    integral[:, 3] = -k[:, 4]*DT
+    if axis == "lateral":
+        integral[:, 4] = -k[:, 5]*DT
+    return np.eye(n), integral, np.eye(n), straight
