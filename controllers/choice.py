@@ -24,6 +24,8 @@ class Choice:
 
 LAWS: dict[str, Choice] = {
     "autopilot": Choice("controllers.laws.autopilot", "cascaded PID: attitude, altitude, speed and heading holds"),
+    "l1": Choice("controllers.laws.l1", "the autopilot, and by L1 adaptation moments that the clean aircraft lacks",
+                 "adaptive"),
     "sis": Choice("controllers.laws.sis", "the Smart Icing System's published attitude and heading holds"),
     "lqr": Choice("controllers.laws.lqr", "linear-quadratic regulator with integral action, scheduled"),
     "lqg": Choice("controllers.laws.lqg", "the same regulator on a Kalman filter that keeps gusts apart"),

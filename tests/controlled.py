@@ -18,9 +18,12 @@ BOUNDS = {
 }
 
 
+CLEAN = aircraft.load("twin_otter")
+
+
 def airframe() -> NDArray:
     """One row with what ice management, protection and laws know of the clean aircraft."""
-    return aircraft.load("twin_otter")
+    return CLEAN.copy()
 
 
 def cruise(n: int = 1) -> NDArray:
