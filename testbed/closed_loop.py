@@ -72,7 +72,7 @@ class ClosedLoop:
         about = (self.estimate, self.advisory, self.management_tuning)
         if knows:
             return Oracle(self.clean, self.dt, *about)
-        if sense == "characterise" and self.managing:
+        if sense == "characterise" and (self.managing or self.adapting):
             return Characteriser(n, self.clean, self.dt, *about, reference)
         return None
 
@@ -89,7 +89,8 @@ class ClosedLoop:
         self._protect = bound(self._shield.protect, self.shield, command, advisory, measurement, estimate, self.clean,
                               self.shield_tuning, dt)
         if self.adapting:
-            self._adapt = bound(adapt.adapt, self.adaptation, command, measurement, estimate, advisory, self.clean,
+            known = self.informant.known if isinstance(self.informant, Characteriser) else estimate
+            self._adapt = bound(adapt.adapt, self.adaptation, command, measurement, known, advisory, self.clean,
                                 self.adaptation_tuning, dt)
         if isinstance(self.informant, Characteriser):
             self.informant.attach(measurement, command)

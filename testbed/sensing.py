@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from controllers.ice_management.sense import tell
 from estimators.characterise import online
 from estimators.characterise.clean import clean_from
+from estimators.characterise.derivatives import TOLD, derivatives
 from estimators.characterise.model import PARTS
 
 SENSES = ("drag", "characterise")  # by excess drag first, in the ice management itself; or by the characteriser
@@ -34,6 +35,8 @@ class Characteriser:
         self.dt, self.estimate, self.advisory, self.tuning = dt, estimate, advisory, tuning
         self.clean, self.character, self.reference = clean_from(clean), online.load(RIVAL), reference
         self.kept, self.severity = online.init(n)
+        self.known = estimate.copy()  # the estimate, with lift and pitch derivatives from the evidence where it is good
+        self.held = np.zeros((n, 2*len(TOLD) + 1))
         self.measurement: NDArray[Any] = np.zeros(0)
         self.command: NDArray[Any] = np.zeros(0)
         self.reset(np.arange(n))
@@ -45,6 +48,7 @@ class Characteriser:
     def reset(self, rows: NDArray) -> None:
         """Begin anew in the given rows; an aircraft's own clean reference stays."""
         online.reset(self.kept, self.severity, rows)
+        self.held[rows], self.known[rows] = 0.0, self.estimate[rows]
         if self.reference is not None:
             own = np.broadcast_to(self.reference, (len(self.severity), self.reference.shape[-1]))
             online.refer(self.kept, own[rows], rows)
@@ -56,11 +60,18 @@ class Characteriser:
                     self.character, self.dt)
         if self.kept.clock[0] < self.dt:
             self._tell(slice(None))
+            values, std, good = derivatives(self.kept.evidence, self.measurement, self.clean)
+            self.held = np.stack([*values.values(), *std.values(), good], axis=1)
+        self.known[:] = self.estimate
+        good = self.held[:, -1] > 0.0
+        for i, name in enumerate(TOLD):
+            self.known[name][good], self.known[f"{name}_std"][good] = self.held[good, i], self.held[good, len(TOLD) + i]
+        self.known["excitation_longitudinal"][good] = 1.0
 
     def memory(self) -> dict[str, NDArray]:
         """What must be kept to go on later."""
         return {f"sense_{name}": array for name, array in online.arrays(self.kept).items()} | {
-            "sense_severity": self.severity}
+            "sense_severity": self.severity, "sense_held": self.held, "sense_known": self.known}
 
     def _tell(self, rows: NDArray | slice) -> None:
         seen, told = self.severity[rows], self.advisory[rows]

@@ -19,7 +19,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.ice_management.clean_answer import bounded, change_aileron_rudder, change_elevator, quasi_pitch
+from controllers.ice_management.clean_answer import (
+    bounded,
+    change_aileron_rudder,
+    change_elevator,
+    quasi_inertia,
+    quasi_pitch,
+)
 from controllers.kernels import air_density, clip
 from controllers.parameters import read_parameters
 from icing_env.jit import entry, kernel
@@ -46,6 +52,8 @@ ADAPTATION_TUNING_FIELDS: list[Field] = [
     ("stability_min", "1", "least share of a stability or damping derivative that is believed"),
     ("control_min", "1", "least share of a control derivative that is believed"),
     ("share_max", "1", "largest share of any derivative that is believed"),
+    ("roll_per_lift", "1", "most that roll derivatives lose per loss of lift slope"),
+    ("roll_margin", "1", "loss of roll derivatives believed without any of lift slope"),
     ("loop_lag", "s", "lag of actuators and instruments in the loop"),
     ("elevator_most", "rad", "largest change of the elevator"),
     ("aileron_most", "rad", "largest change of the aileron"),
@@ -70,7 +78,7 @@ def init(n: int) -> NDArray[Any]:
 
 @kernel
 def followed(share: float, value: float, std: float, clean: float, low: float, way: float, g: Any) -> float:
-    """Believed share of one derivative a step on: towards its estimate, within bounds; held if that is too doubtful."""
+    """Believed share of one derivative a step on: towards its estimate, not below `low`; held in doubt."""
     found = value/clean
     if not (math.isfinite(found) and std < g.doubt_max*abs(clean)):
         return share
@@ -83,19 +91,23 @@ def believe(b: Any, e: Any, m: Any, frame: Any, g: Any, dt: float) -> None:
     way = 1.0 - math.exp(-dt/g.follow_time)
     low, least = g.stability_min, g.control_min
     cm_alpha, cm_q = quasi_pitch(frame, air_density(m))
+    cm_elevator = frame.Cm_elevator/quasi_inertia(frame, air_density(m))
     good = e.health == 1.0 and e.excitation_longitudinal >= g.excitation_low
     b.frozen_pitch = 0.0 if good and e.Cm_alpha_std < g.doubt_max*abs(cm_alpha) else 1.0
     if good:
         b.CL_alpha = followed(b.CL_alpha, e.CL_alpha, e.CL_alpha_std, frame.CX_0 - frame.CZ_alpha, low, way, g)
         b.Cm_alpha = followed(b.Cm_alpha, e.Cm_alpha, e.Cm_alpha_std, cm_alpha, low, way, g)
         b.Cm_q = followed(b.Cm_q, e.Cm_q, e.Cm_q_std, cm_q, low, way, g)
-        b.Cm_elevator = followed(b.Cm_elevator, e.Cm_elevator, e.Cm_elevator_std, frame.Cm_elevator, least, way, g)
+        b.Cm_elevator = followed(b.Cm_elevator, e.Cm_elevator, e.Cm_elevator_std, cm_elevator, least, way, g)
     good = e.health == 1.0 and e.excitation_lateral >= g.excitation_low
     b.frozen_turn = 0.0 if good and e.Cn_beta_std < g.doubt_max*abs(frame.Cn_beta) else 1.0
     if good:
-        b.Cl_beta = followed(b.Cl_beta, e.Cl_beta, e.Cl_beta_std, frame.Cl_beta, low, way, g)
-        b.Cl_p = followed(b.Cl_p, e.Cl_p, e.Cl_p_std, frame.Cl_p, low, way, g)
-        b.Cl_aileron = followed(b.Cl_aileron, e.Cl_aileron, e.Cl_aileron_std, frame.Cl_aileron, least, way, g)
+        # gusts on half wings unlike in slope roll the aircraft as if aileron and damping were lost
+        wing = 1.0 - g.roll_per_lift*(1.0 - b.CL_alpha) - g.roll_margin
+        b.Cl_beta = followed(b.Cl_beta, e.Cl_beta, e.Cl_beta_std, frame.Cl_beta, max(low, wing), way, g)
+        b.Cl_p = followed(b.Cl_p, e.Cl_p, e.Cl_p_std, frame.Cl_p, max(low, wing), way, g)
+        b.Cl_aileron = followed(b.Cl_aileron, e.Cl_aileron, e.Cl_aileron_std, frame.Cl_aileron, max(least, wing), way,
+                                g)
         b.Cn_beta = followed(b.Cn_beta, e.Cn_beta, e.Cn_beta_std, frame.Cn_beta, low, way, g)
         b.Cn_r = followed(b.Cn_r, e.Cn_r, e.Cn_r_std, frame.Cn_r, low, way, g)
         b.Cn_rudder = followed(b.Cn_rudder, e.Cn_rudder, e.Cn_rudder_std, frame.Cn_rudder, least, way, g)

@@ -22,11 +22,17 @@ from icing_env.jit import kernel
 
 
 @kernel
+def quasi_inertia(frame: Any, density: float) -> float:
+    """Share by which the downwash lag makes the pitching inertia seem smaller (`testbed.oracle.quasi_steady`)."""
+    mass: float = density*frame.wing_area*frame.chord*frame.chord*frame.tail_arm
+    return 1.0 + frame.Cm_alphadot*mass/(4.0*frame.inertia_yy)
+
+
+@kernel
 def quasi_pitch(frame: Any, density: float) -> tuple[float, float]:
-    """Cm_alpha and Cm_q of the clean aircraft with the downwash lag in them (as `testbed.oracle.quasi_steady`)."""
+    """Cm_alpha and Cm_q of the clean aircraft with the downwash lag in them: what identifiers find."""
     lag = frame.Cm_alphadot*density*frame.wing_area*frame.chord/(4.0*frame.mass)
-    inertia = 1.0 + frame.Cm_alphadot*density*frame.wing_area*frame.chord*frame.chord*frame.tail_arm/(
-        4.0*frame.inertia_yy)
+    inertia = quasi_inertia(frame, density)
     return (frame.Cm_alpha + lag*frame.CZ_alpha)/inertia, (frame.Cm_q + lag*frame.CZ_q)/inertia
 
 
@@ -46,8 +52,9 @@ def change_elevator(b: Any, m: Any, frame: Any, asked: float, alpha: float, q: f
     force = 0.5*density*v*frame.wing_area/frame.mass  # q S/(m V)
     moment = 0.5*density*v*v*frame.wing_area*frame.chord/frame.inertia_yy
     cm_alpha, cm_q = quasi_pitch(frame, density)
+    cm_elevator = frame.Cm_elevator/quasi_inertia(frame, density)
     l_clean, z = force*(frame.CX_0 - frame.CZ_alpha), 1.0 + force*half*frame.CZ_q
-    ma_clean, mq_clean, me_clean = moment*cm_alpha, moment*half*cm_q, moment*frame.Cm_elevator
+    ma_clean, mq_clean, me_clean = moment*cm_alpha, moment*half*cm_q, moment*cm_elevator
     la, ma, mq, me = l_clean*b.CL_alpha, ma_clean*b.Cm_alpha, mq_clean*b.Cm_q, me_clean*b.Cm_elevator
     le = -force*frame.CZ_elevator*b.Cm_elevator  # the tail's lift keeps the share that its moment keeps
     trace = mq_clean - l_clean - (mq - la)
