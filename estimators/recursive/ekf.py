@@ -4,8 +4,10 @@ Prediction by Heun's rule with the inputs of the last sample and of this one; it
 by parameters the rows themselves. Products of an error of state with one of a parameter, which a first-order filter
 takes for certain, add their variance P_xx row_x' P_theta row_x to xdot and to what the accelerometers should show, as
 in the second-order filter (Jazwinski 1970, section 9.3): without it the first noise of a manoeuvre, met with parameters
-known to a factor of two, throws them far off. Unlike the H-infinity observer it trusts its noise statistics: where d
-and n are not those of the flight, neither are its gain and its covariance (Ding et al., Acta Aerodyn. Sinica, 2016).
+known to a factor of two, throws them far off. Their mean, sum over i of (d row/dx_i)'P_theta,x_i, is added likewise:
+without it noise in the states biases the parameters. Unlike the H-infinity observer it trusts its noise statistics:
+where d and n are not those of the flight,
+neither are its gain and its covariance (Ding et al., Acta Aerodyn. Sinica, 2016).
 """
 
 from __future__ import annotations
@@ -47,6 +49,7 @@ def predict(ob: Any, m: Any, af: Any, tn: Any, p: Any, axis: int, alpha: float, 
     """
     at, x, theta, size = ob["at"], ob["x"], ob["theta"], 3 + PARAMETERS[axis]
     a, b = 3 * axis, OFFSET[axis] - 3
+    bend(ob, p, axis)
     rows_at(at, ob["before"], af, axis, x[a], x[a + 1], x[a + 2], ob["alpha_before"], ob["beta_before"])
     for k in range(3):
         ob["slope"][k] = at["rest"][a + k] + product(at["row"], theta, a + k)
@@ -56,7 +59,7 @@ def predict(ob: Any, m: Any, af: Any, tn: Any, p: Any, axis: int, alpha: float, 
     rows_at(at, m, af, axis, x[a] + dt * s[0], x[a + 1] + dt * s[1], x[a + 2] + dt * s[2], alpha, beta)
     for k in range(3):
         c = a + k
-        x[c] += 0.5 * dt * (s[k] + at["rest"][c] + product(at["row"], theta, c))
+        x[c] += 0.5 * dt * (s[k] + at["rest"][c] + product(at["row"], theta, c)) + dt * ob["curve"][c, 1]
         for j in range(size):
             total = p[k, j]
             for i in range(3):
@@ -102,7 +105,6 @@ def differentiate(ob: Any, m: Any, af: Any, p: Any, axis: int, alpha: float, bet
     for k in range(3):
         c = a + k
         ob["slope"][k] = at["rest"][c] + product(at["row"], theta, c)
-        ob["curve"][c, 0], ob["curve"][c, 1] = 0.0, 0.0
         if ACCELEROMETER[c] >= 0:
             ob["cross"][k] = at["factor"][ACCELEROMETER[c]]
             ob["wide"][k, 3] = ob["cross"][k] * (product(at["row"], theta, c) - at["felt"][ACCELEROMETER[c]])
@@ -119,24 +121,24 @@ def differentiate(ob: Any, m: Any, af: Any, p: Any, axis: int, alpha: float, bet
                 g = ACCELEROMETER[c]
                 h = at["factor"][g] * (product(at["row"], theta, c) - at["felt"][g])
                 ob["wide"][k, i] = (h - ob["wide"][k, 3]) / step
-        bend(ob, p, axis, i, step)
+            for j in range(FIRST[c], FIRST[c] + COUNT[c]):
+                ob["bends"][i, j] = (at["row"][j] - ob["row_kept"][j]) / step
+    bend(ob, p, axis)
 
 
 @block
-def bend(ob: Any, p: Any, axis: int, i: int, step: float) -> None:
-    """Add state i's share to ob["curve"], from the rows in ob["at"], `step` away from those kept."""
-    at, b = ob["at"], OFFSET[axis] - 3
+def bend(ob: Any, p: Any, axis: int) -> None:
+    """ob["curve"]: variance and mean that products of state and parameter errors add to row'theta of each channel."""
+    bends, b = ob["bends"], OFFSET[axis] - 3
     for k in range(3):
         c = 3 * axis + k
-        total = 0.0
-        for j in range(FIRST[c], FIRST[c] + COUNT[c]):
-            for n in range(FIRST[c], FIRST[c] + COUNT[c]):
-                change = (at["row"][j] - ob["row_kept"][j]) * (at["row"][n] - ob["row_kept"][n])
-                total += change * p[j - b, n - b]
-        total *= p[i, i] / (step * step)
-        ob["curve"][c, 0] += total
-        if ACCELEROMETER[c] >= 0:
-            ob["curve"][c, 1] += ob["cross"][k] * ob["cross"][k] * total
+        variance, mean = 0.0, 0.0
+        for i in range(3):
+            for j in range(FIRST[c], FIRST[c] + COUNT[c]):
+                mean += bends[i, j] * p[j - b, i]
+                for n in range(FIRST[c], FIRST[c] + COUNT[c]):
+                    variance += bends[i, j] * bends[i, n] * p[j - b, n - b] * p[i, i]
+        ob["curve"][c, 0], ob["curve"][c, 1] = variance, mean
 
 
 @block
@@ -153,10 +155,10 @@ def feel(ob: Any, tn: Any, p: Any, axis: int, dt: float) -> None:
         if g < 0:
             continue
         moved = (ob["x"][3 * axis] - x0, ob["x"][3 * axis + 1] - x1, ob["x"][3 * axis + 2] - x2)
-        h = ob["wide"][k, 3] + factors[k] * (product(ob["row_kept"], theta, c) - ob["slope"][k])
+        h = ob["wide"][k, 3] + factors[k] * (product(ob["row_kept"], theta, c) - ob["slope"][k] + ob["curve"][c, 1])
         for i in range(3):
             h += ob["wide"][k, i] * moved[i]
-        strength = tn["accelerometer"][g] ** 2 / dt + ob["curve"][c, 1]
+        strength = tn["accelerometer"][g] ** 2 / dt + factors[k] * factors[k] * ob["curve"][c, 0]
         for j in range(size):
             total = 0.0
             for i in range(3):

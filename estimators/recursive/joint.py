@@ -40,7 +40,8 @@ MEMORY = np.dtype([
     ("before", MEASUREMENT), ("alpha_before", "f8"), ("beta_before", "f8"),  # the last sample, incidence corrected
     ("at", AT),  # rows at a state that is being tried
     ("row_kept", "f8", (26,)), ("jacobian", "f8", (6, 3)),  # of the channels by the vector's own states
-    ("curve", "f8", (6, 2)),  # variance that products of state and parameter errors add: xdot of a channel, felt of it
+    ("bends", "f8", (3, 26)),  # the rows by the vector's own states
+    ("curve", "f8", (6, 2)),  # what products of state and parameter errors add to row'theta: variance and mean
     ("cross", "f8", (20,)), ("gain", "f8", (20,)), ("left", "f8", (20,)), ("slope", "f8", (3,)),
     ("wide", "f8", (3, 20)),  # scratch
     ("columns", "f8", (20, 3)), ("points", "f8", (7, 3)), ("try", "f8", (20,)),  # scratch of the unscented filter
