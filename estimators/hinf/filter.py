@@ -20,11 +20,9 @@ import math
 from typing import Any
 
 from estimators.hinf.channel import forget, learn
-from estimators.observer.excitation import gate
-from estimators.observer.filters import look, remember
+from estimators.observer.excitation import hearing
 from estimators.observer.layout import ACCELEROMETER, COUNT, DIAGONAL, FIRST, PACKED
-from estimators.observer.report import follow_drag, report
-from estimators.observer.rows import readable
+from estimators.observer.sample import close_sample, open_sample
 from icing_env.jit import entry, kernel
 
 
@@ -36,10 +34,7 @@ def learn_all(ob: Any, tn: Any, excited: tuple[float, float, float, float], dt: 
     """
     theta, b3, gain = ob["theta"], ob["b3"], ob["gain"]
     kappa = 1.0 - 1.0 / (tn["gamma"] * tn["gamma"])
-    low, high = tn["share_low"], tn["share_high"]
-    pitch, turn, lift, side = excited
-    turning = dt * gate(turn, low, high)
-    heard = (dt, dt * gate(lift, low, high), dt * gate(pitch, low, high), dt * gate(side, low, high), turning, turning)
+    heard = hearing(tn, excited, dt)
     good = True
     for c in range(6):
         first, packed, m = FIRST[c], PACKED[c], COUNT[c]
@@ -58,8 +53,8 @@ def learn_all(ob: Any, tn: Any, excited: tuple[float, float, float, float], dt: 
 
 
 @kernel
-def healthy(ob: Any) -> bool:
-    """True while every estimate is finite and every variance positive."""
+def settle(ob: Any) -> bool:
+    """Write the standard deviations. False if a variance is not positive or an estimate not finite."""
     total = 0.0
     lowest = 1.0
     for channel in range(6):
@@ -67,29 +62,23 @@ def healthy(ob: Any) -> bool:
             variance = ob["b3"][PACKED[channel] + i * (i + 1) // 2 + i]
             total += variance + ob["theta"][FIRST[channel] + i]
             lowest = min(lowest, variance)
-    return lowest > 0.0 and math.isfinite(total)
+    if not (lowest > 0.0 and math.isfinite(total)):
+        return False
+    for i in range(26):
+        ob["deviation"][i] = math.sqrt(ob["b3"][DIAGONAL[i]])
+    return True
 
 
 @kernel
 def observe(ob: Any, est: Any, m: Any, af: Any, tn: Any, dt: float) -> None:
     """One aircraft, one sample. See `step`."""
-    est["health"] = 0.0
-    if ob["failed"] > 0.0:
+    readable, excited = open_sample(ob, est, m, af, tn, dt)
+    if not readable:
         return
-    if not readable(m):
-        ob["seated"] = 0.0
-        return
-    excited = look(ob, m, af, tn, dt)
+    good = True
     if ob["seated"] > 0.0:
-        good = learn_all(ob, tn, excited, dt)
-        if not (good and healthy(ob)):
-            ob["failed"] = 1.0
-            return
-        follow_drag(ob, af, tn, dt)
-        for i in range(26):
-            ob["deviation"][i] = math.sqrt(ob["b3"][DIAGONAL[i]])
-    remember(ob)
-    report(ob, est, excited[0], excited[1])
+        good = learn_all(ob, tn, excited, dt) and settle(ob)
+    close_sample(ob, est, af, tn, good, excited, dt)
 
 
 @entry

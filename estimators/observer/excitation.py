@@ -72,3 +72,18 @@ def shares(ob: Any, tn: Any, af: Any) -> tuple[float, float, float, float]:
 def gate(share: float, low: float, high: float) -> float:
     """0 below `low`, 1 above `high`, linear between; always 1 where high = 0."""
     return 1.0 if high <= 0.0 else min(1.0, max(0.0, (share - low) / (high - low)))
+
+
+@kernel
+def hearing(
+    tn: Any, excited: tuple[float, float, float, float], whole: float
+) -> tuple[float, float, float, float, float, float]:
+    """How much of `whole` each of the six channels takes in, as far as it is excited; drag always takes in all.
+
+    excited: shares of pitch, of turn, of lift and of side force.
+    """
+    low, high = tn["share_low"], tn["share_high"]
+    pitch, turn, lift, side = excited
+    turning = whole * gate(turn, low, high)
+    lifting, pitching = whole * gate(lift, low, high), whole * gate(pitch, low, high)
+    return whole, lifting, pitching, whole * gate(side, low, high), turning, turning

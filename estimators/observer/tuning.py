@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -87,3 +88,28 @@ def read_tuning(
             if felt:
                 tuning["accelerometer"][0, WITH_ACCELEROMETER.index(channel)] = values["accelerometer"]
     return tuning
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Where a method's tuning stands and what it holds: `name` of its file in `configs/estimators`, and its own fields.
+
+    numbers: scalar fields; per_channel: fields of six; each on top of what all methods share.
+    """
+
+    name: str
+    numbers: tuple[str, ...] = ()
+    per_channel: tuple[str, ...] = ()
+
+    def read(self, path: str | Path) -> np.ndarray:
+        """A tuning file as an array of one row. Raises InputError on an unknown or missing key."""
+        return read_tuning(path, self.numbers, self.per_channel)
+
+    def default(self) -> np.ndarray:
+        """A fresh copy of the one tuning that everything uses, an array of one row."""
+        return _default(self).copy()
+
+
+@cache
+def _default(tuning: Tuning) -> np.ndarray:
+    return tuning.read(folder() / "estimators" / f"{tuning.name}.toml")

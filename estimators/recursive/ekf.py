@@ -4,24 +4,24 @@ Prediction by Heun's rule with the inputs of the last sample and of this one; it
 by parameters the rows themselves. Products of an error of state with one of a parameter, which a first-order filter
 takes for certain, add their variance P_xx row_x' P_theta row_x to xdot and to what the accelerometers should show, as
 in the second-order filter (Jazwinski 1970, section 9.3): without it the first noise of a manoeuvre, met with parameters
-known to a factor of two, throws them far off. Unlike the H-infinity observer it trusts its noise statistics: where d
-and n are not those of the flight, neither are its gain and its covariance (Ding et al., Acta Aerodyn. Sinica, 2016).
+known to a factor of two, throws them far off. Their mean, sum over i of (d row/dx_i)'P_theta,x_i, is added likewise:
+without it noise in the states biases the parameters. Unlike the H-infinity observer it trusts its noise statistics:
+where d and n are not those of the flight,
+neither are its gain and its covariance (Ding et al., Acta Aerodyn. Sinica, 2016).
 """
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from estimators.estimate import Estimate
 from estimators.observer import record as runs
-from estimators.observer.filters import look, remember
 from estimators.observer.layout import ACCELEROMETER, COUNT, FIRST
-from estimators.observer.report import follow_drag, report
-from estimators.observer.rows import incidence, readable
+from estimators.observer.rows import incidence
+from estimators.observer.sample import close_sample, open_sample
+from estimators.observer.tuning import Tuning
 from estimators.recursive.joint import (
+    FIELDS,
     OFFSET,
     PARAMETERS,
     begin,
@@ -32,15 +32,13 @@ from estimators.recursive.joint import (
     remember_measurement,
     rows_at,
     settle,
-    tuning_reader,
     update,
     wander,
 )
 from icing_env.jit import block, entry, kernel
-from icing_env.record import FlightRecord
 
 STEPS = ((0.1, 1e-4, 1e-4), (1e-4, 1e-4, 1e-4))  # m/s, rad, rad/s: differences for the Jacobian (assumed)
-default_tuning = tuning_reader("ekf")
+default_tuning = Tuning("ekf", *FIELDS).default
 
 
 @block
@@ -51,6 +49,7 @@ def predict(ob: Any, m: Any, af: Any, tn: Any, p: Any, axis: int, alpha: float, 
     """
     at, x, theta, size = ob["at"], ob["x"], ob["theta"], 3 + PARAMETERS[axis]
     a, b = 3 * axis, OFFSET[axis] - 3
+    bend(ob, p, axis)
     rows_at(at, ob["before"], af, axis, x[a], x[a + 1], x[a + 2], ob["alpha_before"], ob["beta_before"])
     for k in range(3):
         ob["slope"][k] = at["rest"][a + k] + product(at["row"], theta, a + k)
@@ -60,7 +59,7 @@ def predict(ob: Any, m: Any, af: Any, tn: Any, p: Any, axis: int, alpha: float, 
     rows_at(at, m, af, axis, x[a] + dt * s[0], x[a + 1] + dt * s[1], x[a + 2] + dt * s[2], alpha, beta)
     for k in range(3):
         c = a + k
-        x[c] += 0.5 * dt * (s[k] + at["rest"][c] + product(at["row"], theta, c))
+        x[c] += 0.5 * dt * (s[k] + at["rest"][c] + product(at["row"], theta, c)) + dt * ob["curve"][c, 1]
         for j in range(size):
             total = p[k, j]
             for i in range(3):
@@ -106,7 +105,6 @@ def differentiate(ob: Any, m: Any, af: Any, p: Any, axis: int, alpha: float, bet
     for k in range(3):
         c = a + k
         ob["slope"][k] = at["rest"][c] + product(at["row"], theta, c)
-        ob["curve"][c, 0], ob["curve"][c, 1] = 0.0, 0.0
         if ACCELEROMETER[c] >= 0:
             ob["cross"][k] = at["factor"][ACCELEROMETER[c]]
             ob["wide"][k, 3] = ob["cross"][k] * (product(at["row"], theta, c) - at["felt"][ACCELEROMETER[c]])
@@ -123,24 +121,24 @@ def differentiate(ob: Any, m: Any, af: Any, p: Any, axis: int, alpha: float, bet
                 g = ACCELEROMETER[c]
                 h = at["factor"][g] * (product(at["row"], theta, c) - at["felt"][g])
                 ob["wide"][k, i] = (h - ob["wide"][k, 3]) / step
-        bend(ob, p, axis, i, step)
+            for j in range(FIRST[c], FIRST[c] + COUNT[c]):
+                ob["bends"][i, j] = (at["row"][j] - ob["row_kept"][j]) / step
+    bend(ob, p, axis)
 
 
 @block
-def bend(ob: Any, p: Any, axis: int, i: int, step: float) -> None:
-    """Add state i's share to ob["curve"], from the rows in ob["at"], `step` away from those kept."""
-    at, b = ob["at"], OFFSET[axis] - 3
+def bend(ob: Any, p: Any, axis: int) -> None:
+    """ob["curve"]: variance and mean that products of state and parameter errors add to row'theta of each channel."""
+    bends, b = ob["bends"], OFFSET[axis] - 3
     for k in range(3):
         c = 3 * axis + k
-        total = 0.0
-        for j in range(FIRST[c], FIRST[c] + COUNT[c]):
-            for n in range(FIRST[c], FIRST[c] + COUNT[c]):
-                change = (at["row"][j] - ob["row_kept"][j]) * (at["row"][n] - ob["row_kept"][n])
-                total += change * p[j - b, n - b]
-        total *= p[i, i] / (step * step)
-        ob["curve"][c, 0] += total
-        if ACCELEROMETER[c] >= 0:
-            ob["curve"][c, 1] += ob["cross"][k] * ob["cross"][k] * total
+        variance, mean = 0.0, 0.0
+        for i in range(3):
+            for j in range(FIRST[c], FIRST[c] + COUNT[c]):
+                mean += bends[i, j] * p[j - b, i]
+                for n in range(FIRST[c], FIRST[c] + COUNT[c]):
+                    variance += bends[i, j] * bends[i, n] * p[j - b, n - b] * p[i, i]
+        ob["curve"][c, 0], ob["curve"][c, 1] = variance, mean
 
 
 @block
@@ -157,10 +155,10 @@ def feel(ob: Any, tn: Any, p: Any, axis: int, dt: float) -> None:
         if g < 0:
             continue
         moved = (ob["x"][3 * axis] - x0, ob["x"][3 * axis + 1] - x1, ob["x"][3 * axis + 2] - x2)
-        h = ob["wide"][k, 3] + factors[k] * (product(ob["row_kept"], theta, c) - ob["slope"][k])
+        h = ob["wide"][k, 3] + factors[k] * (product(ob["row_kept"], theta, c) - ob["slope"][k] + ob["curve"][c, 1])
         for i in range(3):
             h += ob["wide"][k, i] * moved[i]
-        strength = tn["accelerometer"][g] ** 2 / dt + ob["curve"][c, 1]
+        strength = tn["accelerometer"][g] ** 2 / dt + factors[k] * factors[k] * ob["curve"][c, 0]
         for j in range(size):
             total = 0.0
             for i in range(3):
@@ -187,28 +185,21 @@ def advance(ob: Any, m: Any, af: Any, tn: Any, p: Any, axis: int, alpha: float, 
 @kernel
 def observe(ob: Any, est: Any, m: Any, af: Any, tn: Any, dt: float) -> None:
     """One aircraft, one sample. See `step`."""
-    est["health"] = 0.0
-    if ob["failed"] > 0.0:
+    readable, excited = open_sample(ob, est, m, af, tn, dt)
+    if not readable:
         return
-    if not readable(m):
-        ob["seated"] = 0.0
-        return
-    excited = look(ob, m, af, tn, dt)
+    good = True
     if ob["seated"] > 0.0:
         open_for(ob, tn, excited)
         alpha, beta = incidence(m, af["vane_lag"], af["boom_gain"], dt)
         advance(ob, m, af, tn, ob["long"], 0, alpha, beta, dt)
         advance(ob, m, af, tn, ob["lat"], 1, alpha, beta, dt)
-        if not settle(ob):
-            ob["failed"] = 1.0
-            return
-        follow_drag(ob, af, tn, dt)
+        good = settle(ob)
     else:
         begin(ob, tn, ob["long"], 0, dt)
         begin(ob, tn, ob["lat"], 1, dt)
-    remember(ob)
     remember_measurement(ob, m, af, dt)
-    report(ob, est, excited[0], excited[1])
+    close_sample(ob, est, af, tn, good, excited, dt)
 
 
 @entry
@@ -223,17 +214,4 @@ def step(memory: Any, estimate: Any, measurement: Any, airframe: Any, tuning: An
 
 
 METHOD = runs.Method("extended Kalman filter", init, step, default_tuning, own_errors=True)
-
-
-def identify(
-    record: FlightRecord,
-    tuning: NDArray[np.void] | None = None,
-    start: float = 1.0,
-    airframe: NDArray[np.void] | None = None,
-) -> dict[str, Estimate]:
-    """Derivatives by name at the end of the record; see `estimators.observer.record.identify`.
-
-    Standard errors are the filter's own: as good as d, n and `accelerometer` of its tuning, which allow for unmodelled
-    accelerations of real flight and are therefore cautious where a record has none.
-    """
-    return runs.identify(METHOD, record, tuning, start, airframe)
+identify = partial(runs.identify, METHOD)

@@ -15,23 +15,18 @@ too small its gain on them is taken away, and the covariance is that of the gain
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.observer.excitation import gate
+from estimators.observer.excitation import hearing
 from estimators.observer.layout import COUNT, FIRST, SEEN, seat
 from estimators.observer.rows import force_rows, incidence, moment_rows
-from estimators.observer.tuning import read_tuning, tuning_type
-from icing_env.configuration import folder
 from icing_env.jit import block, kernel
 from icing_env.types import MEASUREMENT
 
-PER_CHANNEL = ("d", "n", "q0", "k0")
-TUNING = tuning_type(("bandwidth",), PER_CHANNEL)
+FIELDS = ("bandwidth",), ("d", "n", "q0", "k0")  # of both tunings: numbers, and those of each channel
 PARAMETERS = (9, 17)  # of each vector, after its three states
 OFFSET = (0, 9)  # first of them in PARAMETER_NAMES
 AT = np.dtype([
@@ -45,21 +40,12 @@ MEMORY = np.dtype([
     ("before", MEASUREMENT), ("alpha_before", "f8"), ("beta_before", "f8"),  # the last sample, incidence corrected
     ("at", AT),  # rows at a state that is being tried
     ("row_kept", "f8", (26,)), ("jacobian", "f8", (6, 3)),  # of the channels by the vector's own states
-    ("curve", "f8", (6, 2)),  # variance that products of state and parameter errors add: xdot of a channel, felt of it
+    ("bends", "f8", (3, 26)),  # the rows by the vector's own states
+    ("curve", "f8", (6, 2)),  # what products of state and parameter errors add to row'theta: variance and mean
     ("cross", "f8", (20,)), ("gain", "f8", (20,)), ("left", "f8", (20,)), ("slope", "f8", (3,)),
     ("wide", "f8", (3, 20)),  # scratch
     ("columns", "f8", (20, 3)), ("points", "f8", (7, 3)), ("try", "f8", (20,)),  # scratch of the unscented filter
 ])  # fmt: skip
-
-
-def tuning_reader(name: str) -> Callable[[], NDArray[np.void]]:
-    """A function that returns a fresh copy of the one tuning in `configs/estimators/<name>.toml`."""
-
-    @cache
-    def read() -> NDArray[np.void]:
-        return read_tuning(folder() / "estimators" / f"{name}.toml", ("bandwidth",), PER_CHANNEL)
-
-    return lambda: read().copy()
 
 
 def init(parameters: NDArray[np.void], tuning: NDArray[np.void], n: int, start: float = 1.0) -> NDArray[np.void]:
@@ -113,10 +99,7 @@ def begin(ob: Any, tn: Any, p: Any, axis: int, dt: float) -> None:
 @kernel
 def open_for(ob: Any, tn: Any, excited: tuple[float, float, float, float]) -> None:
     """How far this sample may move each parameter. excited: shares of pitch, of turn, of lift and of side force."""
-    low, high = tn["share_low"], tn["share_high"]
-    pitch, turn, lift, side = excited
-    turning = gate(turn, low, high)
-    shares = (1.0, gate(lift, low, high), gate(pitch, low, high), gate(side, low, high), turning, turning)
+    shares = hearing(tn, excited, 1.0)
     for c in range(6):
         for i in range(FIRST[c], FIRST[c] + COUNT[c]):
             ob["open"][i] = shares[c]

@@ -17,21 +17,17 @@ Covariance: (X'X)^-1 {sum of squared scores Re(x e)} (X'X)^-1, which needs no wh
 from __future__ import annotations
 
 import math
-from functools import cache
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.estimate import Estimate
 from estimators.observer import record as runs
-from estimators.observer.excitation import gate
-from estimators.observer.filters import look, remember
+from estimators.observer.excitation import hearing
 from estimators.observer.layout import FIRST, seat
-from estimators.observer.report import follow_drag, report
-from estimators.observer.rows import readable
-from estimators.observer.tuning import read_tuning, tuning_type
+from estimators.observer.sample import close_sample, open_sample
+from estimators.observer.tuning import Tuning
 from estimators.recursive.spectra import (
     MEMORY,
     fit,
@@ -39,26 +35,10 @@ from estimators.recursive.spectra import (
     set_phases,
     transform,
 )
-from icing_env.configuration import folder
 from icing_env.jit import entry, kernel
-from icing_env.record import FlightRecord
 
 NUMBERS = ("lowest", "highest", "interval", "memory", "drag_memory", "bandwidth", "q0")
-TUNING = tuning_type(NUMBERS, ())
-
-def tuning_from(path: str | Path) -> NDArray[np.void]:
-    """Read a tuning file; a `TUNING` array of one row. Raises InputError on an unknown or missing key."""
-    return read_tuning(path, NUMBERS, ())
-
-
-@cache
-def _default() -> NDArray[np.void]:
-    return tuning_from(folder() / "estimators" / "real_time_frequency.toml")
-
-
-def default_tuning() -> NDArray[np.void]:
-    """A fresh copy of the one tuning that everything uses (a `TUNING` array of one row)."""
-    return _default().copy()
+default_tuning = Tuning("real_time_frequency", NUMBERS).default
 
 
 def init(parameters: NDArray[np.void], tuning: NDArray[np.void], n: int, start: float = 1.0) -> NDArray[np.void]:
@@ -76,10 +56,7 @@ def init(parameters: NDArray[np.void], tuning: NDArray[np.void], n: int, start: 
 @kernel
 def learn(ob: Any, tn: Any, excited: tuple[float, float, float, float], dt: float) -> bool:
     """One sample into the sums; at the end of an interval, new estimates. False if an estimate is not finite."""
-    low, high = tn["share_low"], tn["share_high"]
-    pitch, turn, lift, side = excited
-    turning = dt * gate(turn, low, high)
-    heard = (dt, dt * gate(lift, low, high), dt * gate(pitch, low, high), dt * gate(side, low, high), turning, turning)
+    heard = hearing(tn, excited, dt)
     transform(ob, tn, heard, dt)
     ob["clock"] -= dt
     if ob["clock"] > 0.5 * dt:
@@ -97,23 +74,16 @@ def learn(ob: Any, tn: Any, excited: tuple[float, float, float, float], dt: floa
 @kernel
 def observe(ob: Any, est: Any, m: Any, af: Any, tn: Any, dt: float) -> None:
     """One aircraft, one sample. See `step`."""
-    est["health"] = 0.0
-    if ob["failed"] > 0.0:
+    readable, excited = open_sample(ob, est, m, af, tn, dt)
+    if not readable:
         return
-    if not readable(m):
-        ob["seated"] = 0.0
-        return
-    excited = look(ob, m, af, tn, dt)
+    good = True
     if ob["seated"] > 0.0:
-        if not learn(ob, tn, excited, dt):
-            ob["failed"] = 1.0
-            return
-        follow_drag(ob, af, tn, dt)
+        good = learn(ob, tn, excited, dt)
     elif ob["turn"][0, 0] == 0.0:
         set_phases(ob, tn, dt)
         ob["clock"] = tn["interval"]
-    remember(ob)
-    report(ob, est, excited[0], excited[1])
+    close_sample(ob, est, af, tn, good, excited, dt)
 
 
 @entry
@@ -127,16 +97,4 @@ def step(memory: Any, estimate: Any, measurement: Any, airframe: Any, tuning: An
 
 
 METHOD = runs.Method("real-time frequency domain", init, step, default_tuning, own_errors=True)
-
-
-def identify(
-    record: FlightRecord,
-    tuning: NDArray[np.void] | None = None,
-    start: float = 1.0,
-    airframe: NDArray[np.void] | None = None,
-) -> dict[str, Estimate]:
-    """Derivatives by name at the end of the record; see `estimators.observer.record.identify`.
-
-    Standard errors are the method's own (see above).
-    """
-    return runs.identify(METHOD, record, tuning, start, airframe)
+identify = partial(runs.identify, METHOD)

@@ -17,27 +17,20 @@ the tuning's noise immaterial, and g = (1 + rho)/(1 - rho) for residuals that fo
 from __future__ import annotations
 
 import math
-from functools import cache
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.estimate import Estimate
 from estimators.observer import record as runs
-from estimators.observer.excitation import gate
-from estimators.observer.filters import look, remember
+from estimators.observer.excitation import hearing
 from estimators.observer.layout import ACCELEROMETER, COUNT, DIAGONAL, FIRST, PACKED, SEEN, seat
-from estimators.observer.report import follow_drag, report
-from estimators.observer.rows import readable
-from estimators.observer.tuning import read_tuning, tuning_type
-from icing_env.configuration import folder
+from estimators.observer.sample import close_sample, open_sample
+from estimators.observer.tuning import Tuning
 from icing_env.jit import block, entry, kernel
-from icing_env.record import FlightRecord
 
-PER_CHANNEL = ("memory", "bandwidth", "n", "q0")
-TUNING = tuning_type((), PER_CHANNEL)
+default_tuning = Tuning("rls", per_channel=("memory", "bandwidth", "n", "q0")).default
 MEMORY = np.dtype([
     *SEEN,
     ("root", "f8", (78,)),  # R of the six channels, column by column
@@ -48,21 +41,6 @@ MEMORY = np.dtype([
     ("work", "f8", (6,)),  # scratch
 ])  # fmt: skip
 STEADIEST = 0.99  # largest correlation that is believed of residuals (assumed: g is then 199)
-
-
-def tuning_from(path: str | Path) -> NDArray[np.void]:
-    """Read a tuning file; a `TUNING` array of one row. Raises InputError on an unknown or missing key."""
-    return read_tuning(path, (), PER_CHANNEL)
-
-
-@cache
-def _default() -> NDArray[np.void]:
-    return tuning_from(folder() / "estimators" / "rls.toml")
-
-
-def default_tuning() -> NDArray[np.void]:
-    """A fresh copy of the one tuning that everything uses (a `TUNING` array of one row)."""
-    return _default().copy()
 
 
 def init(parameters: NDArray[np.void], tuning: NDArray[np.void], n: int, start: float = 1.0) -> NDArray[np.void]:
@@ -167,10 +145,7 @@ def judge(ob: Any, tn: Any, c: int, residual: float, heard: float) -> float:
 @kernel
 def learn(ob: Any, tn: Any, excited: tuple[float, float, float, float], dt: float) -> bool:
     """All six channels over one sample. False if any of them failed. excited: shares of pitch, turn, lift and side."""
-    low, high = tn["share_low"], tn["share_high"]
-    pitch, turn, lift, side = excited
-    turning = dt * gate(turn, low, high)
-    heard = (dt, dt * gate(lift, low, high), dt * gate(pitch, low, high), dt * gate(side, low, high), turning, turning)
+    heard = hearing(tn, excited, dt)
     good = True
     for c in range(6):
         let_go(ob, tn, c, heard[c])
@@ -189,20 +164,13 @@ def learn(ob: Any, tn: Any, excited: tuple[float, float, float, float], dt: floa
 @kernel
 def observe(ob: Any, est: Any, m: Any, af: Any, tn: Any, dt: float) -> None:
     """One aircraft, one sample. See `step`."""
-    est["health"] = 0.0
-    if ob["failed"] > 0.0:
+    readable, excited = open_sample(ob, est, m, af, tn, dt)
+    if not readable:
         return
-    if not readable(m):
-        ob["seated"] = 0.0
-        return
-    excited = look(ob, m, af, tn, dt)
+    good = True
     if ob["seated"] > 0.0:
-        if not learn(ob, tn, excited, dt):
-            ob["failed"] = 1.0
-            return
-        follow_drag(ob, af, tn, dt)
-    remember(ob)
-    report(ob, est, excited[0], excited[1])
+        good = learn(ob, tn, excited, dt)
+    close_sample(ob, est, af, tn, good, excited, dt)
 
 
 @entry
@@ -217,13 +185,4 @@ def step(memory: Any, estimate: Any, measurement: Any, airframe: Any, tuning: An
 
 
 METHOD = runs.Method("recursive least squares", init, step, default_tuning)
-
-
-def identify(
-    record: FlightRecord,
-    tuning: NDArray[np.void] | None = None,
-    start: float = 1.0,
-    airframe: NDArray[np.void] | None = None,
-) -> dict[str, Estimate]:
-    """Derivatives by name at the end of the record; see `estimators.observer.record.identify`."""
-    return runs.identify(METHOD, record, tuning, start, airframe)
+identify = partial(runs.identify, METHOD)

@@ -11,18 +11,16 @@ The measured states are linear in the vector and need no points.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from estimators.estimate import Estimate
 from estimators.observer import record as runs
-from estimators.observer.filters import look, remember
 from estimators.observer.layout import ACCELEROMETER, COUNT, FIRST
-from estimators.observer.report import follow_drag, report
-from estimators.observer.rows import incidence, readable
+from estimators.observer.rows import incidence
+from estimators.observer.sample import close_sample, open_sample
+from estimators.observer.tuning import Tuning
 from estimators.recursive.joint import (
+    FIELDS,
     OFFSET,
     PARAMETERS,
     begin,
@@ -32,14 +30,12 @@ from estimators.recursive.joint import (
     remember_measurement,
     rows_at,
     settle,
-    tuning_reader,
     update,
     wander,
 )
 from icing_env.jit import block, entry, kernel
-from icing_env.record import FlightRecord
 
-default_tuning = tuning_reader("ukf")
+default_tuning = Tuning("ukf", *FIELDS).default
 
 
 @block
@@ -211,28 +207,21 @@ def advance(ob: Any, m: Any, af: Any, tn: Any, p: Any, axis: int, alpha: float, 
 @kernel
 def observe(ob: Any, est: Any, m: Any, af: Any, tn: Any, dt: float) -> None:
     """One aircraft, one sample. See `step`."""
-    est["health"] = 0.0
-    if ob["failed"] > 0.0:
+    readable, excited = open_sample(ob, est, m, af, tn, dt)
+    if not readable:
         return
-    if not readable(m):
-        ob["seated"] = 0.0
-        return
-    excited = look(ob, m, af, tn, dt)
+    good = True
     if ob["seated"] > 0.0:
         open_for(ob, tn, excited)
         alpha, beta = incidence(m, af["vane_lag"], af["boom_gain"], dt)
         good = advance(ob, m, af, tn, ob["long"], 0, alpha, beta, dt)
         good = good and advance(ob, m, af, tn, ob["lat"], 1, alpha, beta, dt)
-        if not (good and settle(ob)):
-            ob["failed"] = 1.0
-            return
-        follow_drag(ob, af, tn, dt)
+        good = good and settle(ob)
     else:
         begin(ob, tn, ob["long"], 0, dt)
         begin(ob, tn, ob["lat"], 1, dt)
-    remember(ob)
     remember_measurement(ob, m, af, dt)
-    report(ob, est, excited[0], excited[1])
+    close_sample(ob, est, af, tn, good, excited, dt)
 
 
 @entry
@@ -247,17 +236,4 @@ def step(memory: Any, estimate: Any, measurement: Any, airframe: Any, tuning: An
 
 
 METHOD = runs.Method("unscented Kalman filter", init, step, default_tuning, own_errors=True)
-
-
-def identify(
-    record: FlightRecord,
-    tuning: NDArray[np.void] | None = None,
-    start: float = 1.0,
-    airframe: NDArray[np.void] | None = None,
-) -> dict[str, Estimate]:
-    """Derivatives by name at the end of the record; see `estimators.observer.record.identify`.
-
-    Standard errors are the filter's own: as good as d, n and `accelerometer` of its tuning, which allow for unmodelled
-    accelerations of real flight and are therefore cautious where a record has none.
-    """
-    return runs.identify(METHOD, record, tuning, start, airframe)
+identify = partial(runs.identify, METHOD)

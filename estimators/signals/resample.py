@@ -12,6 +12,8 @@ from icing_env.record import DataProblem, FlightRecord, FloatArray
 
 GAP = 0.2  # s: a channel that is silent for longer than this, and for four of its own intervals, has a gap
 IRREGULAR = 0.01  # share of the interval by which time steps may differ before the record is put on a grid
+# What the equations of motion need at the record's rate; others may be sampled more slowly and lack nothing.
+FAST = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "ax", "ay", "az", "elevator", "aileron", "rudder")
 
 
 @dataclass(frozen=True)
@@ -53,13 +55,19 @@ def common_grid(record: FlightRecord) -> Grid:
         at = record.time[valid]
         values[name] = np.interp(time, at, samples[valid])
         gaps = _gaps(time, at)
-        if not valid.all():
+        if not valid.all() and (name in FAST or not _slow(np.flatnonzero(valid))):
             kind = f"{int(np.sum(~valid))} of {len(valid)} samples missing, interpolated"
             problems.append(DataProblem(name, kind, *_span(record.time[~valid]), True))
         if gaps.any():
             missing[name] = gaps
             problems.append(DataProblem(name, "gap, left out", *_span(time[gaps]), True))
     return Grid(time, dt, values, missing, tuple(problems))
+
+
+def _slow(rows: NDArray[np.intp]) -> bool:
+    """Whether a channel was sampled at every so manieth row: its own rate, and nothing is missing."""
+    step = np.diff(rows)
+    return len(step) > 0 and int(step.min()) > 1 and int(step.max()) <= int(step.min()) + 1
 
 
 def _gaps(time: FloatArray, at: FloatArray) -> NDArray[np.bool_]:
