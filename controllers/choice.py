@@ -33,6 +33,7 @@ LAWS: dict[str, Choice] = {
     "sis": Choice("controllers.laws.sis", "the Smart Icing System's published attitude and heading holds"),
     "lqr": Choice("controllers.laws.lqr", "linear-quadratic regulator with integral action, scheduled"),
     "lqg": Choice("controllers.laws.lqg", "the same regulator on a Kalman filter that keeps gusts apart"),
+    "h_infinity": Choice("controllers.laws.h_infinity", "H-infinity attitude loops by mixed sensitivity"),
 }
 PROTECTIONS: dict[str, Choice] = {
     "surfaces": Choice("controllers.protection.surfaces", "surfaces kept within what the limits allow"),
