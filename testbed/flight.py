@@ -6,12 +6,13 @@ The record holds measurements and commands only; the truth goes into tables of i
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from controllers import policies
 from controllers.choice import LAWS
 from icing_env.atmosphere import density
 from icing_env.errors import InputError, nearest
@@ -22,6 +23,7 @@ from icing_env.types import CURRENT_FIELDS, MEASUREMENT_FIELDS, OUTCOME_FIELDS, 
 from icing_env.world import World
 from testbed.environments import loop_factory, reveal
 from testbed.oracle import quasi_steady, zero_lift_drag
+from testbed.piloted import Piloted
 
 COMMANDS = ("elevator", "aileron", "rudder")
 SWITCHES = ("boots_wing", "boots_tail", "boots_vtail_struts", "prop_heat")
@@ -43,19 +45,31 @@ class Controller:
     estimator: str = "hinf"  # of estimators.observer.choice, or "oracle"
     sense: str = "drag"  # of testbed.sensing.SENSES
 
+    policies: tuple[str, ...] = ()  # of controllers.policies, one for each training seed; they fly instead of the law
+
     @property
     def members(self) -> tuple[str, ...]:
-        """Names that fly under this one: itself."""
-        return (self.name,)
+        """Names that fly under this one: itself, or the policies of its training seeds."""
+        return self.policies or (self.name,)
+
+
+def _learned() -> dict[str, Controller]:
+    """The policies that come with the project, those of one configuration under one name."""
+    groups: dict[str, tuple[str, ...]] = {}
+    for name in policies.policies():
+        group = name.rstrip("0123456789").rstrip("_")
+        groups[group] = (*groups.get(group, ()), name)
+    return {group: Controller(group, f"learned, {len(names)} training seeds", "learned", None, policies=names)
+            for group, names in groups.items()}
 
 
 CONTROLLERS = {name: Controller(name, law.description, law.kind, name) for name, law in LAWS.items()} | {
     "hands_off": Controller("hands_off", "controls held at the trim", "classical", None),
-    "adapted": Controller("adapted", "autopilot, control laws adapted by the H-infinity estimate", "adaptive",
-                          "autopilot", adaptation=True),
+    "adapted": Controller("adapted", "autopilot, adapted by what observer and characteriser find", "adaptive",
+                          "autopilot", adaptation=True, sense="characterise"),
     "oracle": Controller("oracle", "autopilot, adapted and protected by one who knows the true ice", "oracle",
                          "autopilot", adaptation=True, estimator="oracle"),
-}
+} | _learned()
 
 
 @dataclass(frozen=True)
@@ -77,7 +91,10 @@ class Flight:
 
 
 def controller(name: str) -> Controller:
-    """The controller of that name; InputError names the nearest."""
+    """The controller of that name, or of one of its training seeds; InputError names the nearest."""
+    for group in CONTROLLERS.values():
+        if name in group.policies:
+            return replace(group, name=name, policies=(name,))
     if name not in CONTROLLERS:
         raise InputError(f"no controller '{name}': {nearest(name, list(CONTROLLERS))}")
     return CONTROLLERS[name]
@@ -102,9 +119,10 @@ def make_world(scenario: Scenario, n: int = 1, who: str = "autopilot", protectio
     loop = loop_factory(observer=observer, management=protection, protection=protection, boots=boots and protection,
                         law=law or pilot.law or "autopilot", shield=shield, sense=sense or pilot.sense,
                         adaptation=pilot.adaptation if adaptation is None else adaptation, estimator=chosen)
+    if pilot.policies and law is None:
+        return Piloted(policies.load(pilot.policies[0]), scenario, n, loop, threads=threads)
     world = World(scenario, n, loop, mode="surfaces" if pilot.law is None and law is None else None, threads=threads)
-    reveal(world)
-    return world
+    return reveal(world)
 
 
 def fly(scenario: Scenario, who: str = "autopilot", seed: int = 0, *, protection: bool = True, observer: bool = True,

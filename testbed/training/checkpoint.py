@@ -10,6 +10,7 @@ import random
 import shutil
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +81,7 @@ def restore(folder: Path, model: Any) -> dict[str, Any]:
         model.action_space.np_random.bit_generator.state = state["actions"]
         version, internal, gauss = state["python"]
         random.setstate((version, tuple(internal), gauss))
-    except (SafetensorError, OSError, ValueError, KeyError, RuntimeError) as problem:
+    except (SafetensorError, BadZipFile, OSError, ValueError, KeyError, RuntimeError) as problem:
         raise InputError(f"{latest}: not a whole checkpoint of this configuration: {problem}") from None
     for name, value in state["counters"].items():
         setattr(model, name, value)

@@ -22,7 +22,7 @@ from testbed.training.evaluate import evaluate, world_of
 from testbed.training.imitation import Demonstration, demonstrate, imitate
 
 EVALUATION_CASES = 8  # of each scenario
-WARM_UP_SEED, WARM_UP_CASES, WARM_UP_TIME = 7_000_000, 32, 60.0  # first seed, aircraft of each scenario, s
+WARM_UP_SEED, WARM_UP_CASES, WARM_UP_TIME = 7_000_000, 32, 120.0  # first seed, aircraft of each scenario, s
 Progress = Callable[[int, int, dict[str, Any]], None]  # steps done, steps in all, latest point of the curve
 
 
@@ -157,11 +157,12 @@ def surroundings(configuration: Configuration, shares: list[tuple[Scenario, floa
         parts.append(TwinOtterVecEnv(
             n, hold=around.hold, shortest=min(around.shortest, scenario.duration), scenario=scenario, mode=around.mode,
             observer=around.observer, management=around.protection, protection=around.protection, boots=boots))
-        world = world_of(scenario, WARM_UP_CASES, None, observer=around.observer, protection=around.protection)
+        world = world_of(scenario, WARM_UP_CASES, None, observer=around.observer, protection=around.protection,
+                         mode="surfaces" if around.mode == "surfaces" else None)
         flights.append(demonstrate(world, around.mode, around.hold, min(WARM_UP_TIME, scenario.duration), WARM_UP_SEED))
     channels = parts[0].world.view.channels
     centre, per_scale = scales(np.concatenate([f.seen.reshape(-1, len(channels)) for f in flights]), channels)
-    return Fleets(parts, centre, per_scale, configuration.reward_scale), flights
+    return Fleets(parts, centre, per_scale, configuration.reward_scale, configuration.reward_root), flights
 
 
 def begin(order: Order, folder: Path, **options: Any) -> Run:

@@ -24,13 +24,16 @@ class Fleets(VecEnv):
         parts: the batches; all with the same spaces.
         centre, per_scale: of the features [channels].
         reward_scale: factor of every reward.
+        root: a reward 1 - P becomes 1 - sqrt(P): the penalties P are weighted squares of errors, and their root counts
+            small errors beside large ones.
     """
 
     def __init__(self, parts: list[TwinOtterVecEnv], centre: NDArray[Any], per_scale: NDArray[Any],
-                 reward_scale: float) -> None:
+                 reward_scale: float, root: bool = False) -> None:
         from gymnasium.spaces import Box
 
-        self.parts, self.centre, self.per_scale, self.reward_scale = parts, centre, per_scale, reward_scale
+        self.parts, self.centre, self.per_scale = parts, centre, per_scale
+        self.reward_scale, self.root = reward_scale, root
         self.bounds = np.cumsum([0, *(part.num_envs for part in parts)])
         shape = parts[0].observation_space.shape
         super().__init__(int(self.bounds[-1]), Box(-FEATURE_MAX, FEATURE_MAX, shape, np.float32), parts[0].action_space)
@@ -64,9 +67,15 @@ class Fleets(VecEnv):
         for info in infos:
             if "terminal_observation" in info:
                 info["terminal_observation"] = self.features(info["terminal_observation"][None])[0]
-        reward = self.reward_scale*np.concatenate([step[1] for step in steps])
-        return (self.features(np.concatenate([step[0] for step in steps])), reward.astype(np.float32),
+        return (self.features(np.concatenate([step[0] for step in steps])),
+                self.shaped(np.concatenate([step[1] for step in steps])),
                 np.concatenate([step[2] for step in steps]), infos)
+
+    def shaped(self, reward: NDArray[Any]) -> NDArray[np.float32]:
+        """Rewards as the learner gets them."""
+        if self.root:
+            reward = 1.0 - np.sqrt(np.maximum(1.0 - reward, 0.0))
+        return (self.reward_scale*reward).astype(np.float32)
 
     def save(self) -> dict[str, NDArray[Any]]:
         """Everything that decides how the flights go on (arrays)."""
