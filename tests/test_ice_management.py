@@ -28,7 +28,7 @@ def managed(estimate, seconds, advisory=None, m=None, frame=None):
 def test_clean_aircraft_has_no_ice_and_ordinary_limits():
     a = managed(believed(), 120)[0]
     assert a["severity"] == pytest.approx(0, abs=1e-3) and a["ice_detected"] == 0 and a["boots_wing"] == 0
-    assert a["alpha_limit"] == pytest.approx(0.2 - 0.0175)
+    assert a["alpha_limit"] == pytest.approx(0.2 - 0.009)
     assert a["flap_limit"] == pytest.approx(np.radians(37.5), abs=1e-4)
     assert a["bank_limit"] > np.radians(45)
 

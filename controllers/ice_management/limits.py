@@ -86,7 +86,8 @@ def limit_envelope(a: Any, m: Any, e: Any, frame: Any, g: Any, dt: float) -> Non
     flap = clip(m.flap, 0.0, g.flap_full)
     stall = frame.alpha_stall + g.alpha_flap*flap - g.alpha_shift*severity
     gusts = min(g.gust_share*math.sqrt(a.alpha_energy), g.gust_max)*iced
-    a.alpha_limit = stall - g.alpha_margin - gusts - g.alpha_unload*a.roll_upset
+    margin = g.alpha_margin_clean + (g.alpha_margin - g.alpha_margin_clean)*iced
+    a.alpha_limit = stall - margin - gusts - g.alpha_unload*a.roll_upset
     kept = 1.0 - lost_slope(a, severity, e, frame, g)
     flap_lift = g.CL_max_flap*flap
     lift = max(flap_lift - frame.CZ_0 - kept*frame.CZ_alpha*stall, 0.1)
