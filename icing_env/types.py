@@ -280,7 +280,7 @@ ESTIMATE = structured(ESTIMATE_FIELDS)
 ADVISORY = structured(ADVISORY_FIELDS, *((memory, "f8") for memory in (
     "memory", "since_detection", "alpha_slow", "alpha_energy", "tail_share", "wing_share", "roll_slow", "roll_model",
     "climb_spare", "told", "collected_wing", "collected_tail", "collected_struts", "collected_propeller", "shot_wing",
-    "shot_tail", "shot_struts", "heating")))
+    "shot_tail", "shot_struts", "heating", "power_share")))
 
 # What an autopilot is to hold.
 TARGET_FIELDS: list[Field] = [

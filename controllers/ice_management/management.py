@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from controllers.ice_management.limits import limit_envelope
 from controllers.ice_management.operate import operate_protection
+from controllers.ice_management.power import sense_power
 from controllers.ice_management.sense import characterise
 from controllers.ice_management.upsets import limit_flap, sense_upsets
 from icing_env.jit import entry
@@ -54,7 +55,8 @@ def step(
         frame = airframe[i if len(airframe) > 1 else 0]
         g = tuning[i if len(tuning) > 1 else 0]
         characterise(a, e, frame, g, dt)
-        operate_protection(a, m, g)
+        operate_protection(a, m, g, dt)
+        sense_power(a, m, frame, g, dt)
         sense_upsets(a, m, frame, g, dt)
         limit_envelope(a, m, e, frame, g, dt)
         limit_flap(a, m, e, frame, g)

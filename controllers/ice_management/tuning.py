@@ -5,8 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
+from controllers.ice_management.operate import OPERATE_FIELDS
+from controllers.ice_management.power import POWER_FIELDS
 from controllers.parameters import read_parameters
 from icing_env.types import Field, structured
 
@@ -24,8 +27,6 @@ IMS_TUNING_FIELDS: list[Field] = [
     ("clear_severity", "1", "severity below which it is no longer believed"),
     ("detect_time", "s", "time above the threshold until ice is detected"),
     ("clear_time", "s", "time below the lower threshold until it is no longer"),
-    ("boots_temperature", "K", "static temperature below which boots are cycled"),
-    ("heat_temperature", "K", "static temperature below which propellers are heated"),
     ("alpha_shift", "rad", "loss of stall angle at severity 1"),
     ("alpha_margin", "rad", "distance of the limit from the stall angle, ice detected"),
     ("alpha_margin_clean", "rad", "the same, clean"),
@@ -63,9 +64,17 @@ IMS_TUNING_FIELDS: list[Field] = [
     ("roll_unlike", "1", "difference of the half wings' eta from which strange roll counts"),
     ("roll_strange", "rad/s2", "roll acceleration beyond that of the controls that counts as an upset"),
 ]
-IMS_TUNING = structured(IMS_TUNING_FIELDS)
+PROTECTION_TUNING_FIELDS = [*OPERATE_FIELDS, *POWER_FIELDS]
+IMS_TUNING = structured([*IMS_TUNING_FIELDS, *PROTECTION_TUNING_FIELDS])
 
 
-def load_tuning(name: str | Path = "ice_management") -> NDArray[Any]:
-    """Thresholds of the ice management, one row of IMS_TUNING. Raises InputError for a file that does not fit."""
-    return read_parameters(name, IMS_TUNING_FIELDS)
+def load_tuning(name: str | Path = "ice_management", protection: str | Path = "ice_protection") -> NDArray[Any]:
+    """Thresholds of the ice management, and when it operates the ice protection, one row of IMS_TUNING.
+
+    Raises InputError for a file that does not fit.
+    """
+    row = np.zeros(1, IMS_TUNING)
+    for part in (read_parameters(name, IMS_TUNING_FIELDS), read_parameters(protection, PROTECTION_TUNING_FIELDS)):
+        for field in part.dtype.names or ():
+            row[field] = part[field]
+    return row
