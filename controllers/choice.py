@@ -28,6 +28,7 @@ LAWS: dict[str, Choice] = {
                  "adaptive"),
     "scheduled": Choice("controllers.laws.scheduled", "the autopilot, its gains scheduled by the observer's estimate",
                         "adaptive"),
+    "mpc": Choice("controllers.laws.mpc", "linear model-predictive control of pitch and bank under the moved limits"),
     "pilot": Choice("controllers.laws.pilot", "a pilot flying attitude: delay, lead, lag, muscles and remnant"),
     "indi": Choice("controllers.laws.indi", "incremental nonlinear dynamic inversion of pitch and roll", "adaptive"),
     "sis": Choice("controllers.laws.sis", "the Smart Icing System's published attitude and heading holds"),
