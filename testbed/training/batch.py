@@ -36,13 +36,14 @@ class Job:
         """Name of its run directory."""
         return f"{self.algorithm}_{self.name}_{self.seed}"
 
-    def command(self, out: Path, minutes: float, steps: int | None) -> list[str]:
+    def command(self, out: Path, minutes: float, share: float) -> list[str]:
         """The process that begins it or goes on with it."""
         folder = out/self.label
         how = ["--resume", str(folder)] if (folder/"run.json").exists() else [
             "--config", self.name, "--seed", str(self.seed), "--out", str(folder)]
-        if steps is not None and "--config" in how:
-            how += ["--steps", str(steps)]
+        if share != 1.0 and "--config" in how:
+            _, chosen = configuration.load(self.algorithm, self.name)
+            how += ["--steps", str(round(share*chosen.n_timesteps))]
         return [sys.executable, "-m", "testbed.cli", "train", self.algorithm, *how, "--threads", "1",
                 "--minutes", f"{minutes:.3f}"]
 
@@ -64,7 +65,7 @@ def finished(job: Job, out: Path) -> bool:
     return (out/job.label/"finished").exists()
 
 
-def run(waiting: list[Job], out: Path, minutes: float, workers: int, steps: int | None) -> None:
+def run(waiting: list[Job], out: Path, minutes: float, workers: int, share: float) -> None:
     """Keep `workers` processes busy until all is learned or the minutes are over."""
     until = time.monotonic() + 60.0*(minutes - ENDING)
     one = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
@@ -74,7 +75,7 @@ def run(waiting: list[Job], out: Path, minutes: float, workers: int, steps: int 
         while waiting and len(going) < workers and left > LEAST:
             job = waiting.pop(0)
             log = (out/f"{job.label}.log").open("ab")
-            going[job] = subprocess.Popen(job.command(out, left - 0.3, steps), stdout=log, stderr=log,
+            going[job] = subprocess.Popen(job.command(out, left - 0.3, share), stdout=log, stderr=log,
                                           env=os.environ | one)
         if not going:
             return
@@ -117,8 +118,8 @@ def compile_first() -> None:
 @click.option("--workers", type=click.IntRange(min=1), default=os.cpu_count() or 1, help="Processes side by side.")
 @click.option("--resume", is_flag=True, help="Go on with the runs in DIR; without, DIR must hold none.")
 @click.option("--only", default="", help="Only runs whose name holds this.")
-@click.option("--steps", type=click.IntRange(min=1), help="Steps of each new run instead of its configuration's.")
-def main(out: Path, minutes: float, workers: int, resume: bool, only: str, steps: int | None) -> None:
+@click.option("--share", type=click.FloatRange(min=1e-4), default=1.0, help="Of its configuration's steps, for each run.")
+def main(out: Path, minutes: float, workers: int, resume: bool, only: str, share: float) -> None:
     """Learn every configuration with every seed."""
     begun = time.monotonic()
     out.mkdir(parents=True, exist_ok=True)
@@ -127,7 +128,7 @@ def main(out: Path, minutes: float, workers: int, resume: bool, only: str, steps
     waiting = [job for job in jobs(only) if not finished(job, out)]
     compile_first()
     click.echo(f"{len(waiting)} runs, {workers} at a time; compiled after {time.monotonic() - begun:.0f} s")
-    run(waiting, out, minutes - (time.monotonic() - begun)/60.0, workers, steps)
+    run(waiting, out, minutes - (time.monotonic() - begun)/60.0, workers, share)
     click.echo(str(pack(out)))
 
 

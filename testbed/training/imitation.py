@@ -107,7 +107,7 @@ def _done(world: World) -> NDArray[np.float32]:
     return np.clip(np.stack(columns, axis=1), -1.0, 1.0).astype(np.float32)
 
 
-def imitate(model: Any, flights: list[Demonstration], epochs: int) -> float:
+def imitate(model: Any, flights: list[Demonstration], updates: int) -> float:
     """Fit the learner's mean action to the autopilot's and its value to the returns that those flights had.
 
     A critic that starts from noise would spoil the actor before it has learned what the flights are worth.
@@ -115,7 +115,7 @@ def imitate(model: Any, flights: list[Demonstration], epochs: int) -> float:
     Args:
         model: PPO or recurrent PPO.
         flights: of `demonstrate`.
-        epochs: passes over them.
+        updates: steps of gradient descent.
 
     Returns:
         Root mean square difference from the autopilot's actions that is left.
@@ -129,18 +129,17 @@ def imitate(model: Any, flights: list[Demonstration], epochs: int) -> float:
     worth = torch.from_numpy(np.concatenate([returns(env.shaped(f.reward), model.gamma) for f in flights], axis=1))
     actor, critic = _paths(model.policy)
     optimiser = torch.optim.Adam([p for part in (*actor, *critic) for p in part.parameters()], RATE)
-    starts = range(0, len(seen) - STRETCH + 1, STRETCH)
-    for _ in range(epochs):
-        losses = []
-        for start in np.random.permutation(starts):  # noqa: NPY002 (the one generator of the learner)
-            now, rows = slice(start, start + STRETCH), torch.randperm(seen.shape[1])[:BATCH]
-            missed = torch.mean((_output(actor, seen[now, rows]) - action[now, rows])**2)
-            misjudged = torch.mean((_output(critic, seen[now, rows])[..., 0] - worth[now, rows])**2)
-            optimiser.zero_grad()
-            (missed + VALUE_WEIGHT*misjudged).backward()
-            optimiser.step()
-            losses.append(float(missed.detach()))
-    return float(np.sqrt(np.mean(losses)))
+    losses = []
+    for _ in range(updates):
+        start = int(torch.randint(max(len(seen) - STRETCH, 0) + 1, ()))
+        now, rows = slice(start, start + STRETCH), torch.randperm(seen.shape[1])[:BATCH]
+        missed = torch.mean((_output(actor, seen[now, rows]) - action[now, rows])**2)
+        misjudged = torch.mean((_output(critic, seen[now, rows])[..., 0] - worth[now, rows])**2)
+        optimiser.zero_grad()
+        (missed + VALUE_WEIGHT*misjudged).backward()
+        optimiser.step()
+        losses.append(float(missed.detach()))
+    return float(np.sqrt(np.mean(losses[-100:])))
 
 
 def returns(reward: NDArray[np.float32], gamma: float) -> NDArray[np.float32]:
