@@ -39,7 +39,7 @@ LAWS: dict[str, Choice] = {
 PROTECTIONS: dict[str, Choice] = {
     "surfaces": Choice("controllers.protection.surfaces", "surfaces kept within what the limits allow"),
     "predictive": Choice("controllers.protection.predictive", "the response run forward, held controls limited"),
-    "barrier": Choice("controllers.protection.barrier", "control-barrier functions, a quadratic programme in each step"),
+    "barrier": Choice("controllers.protection.barrier", "control-barrier functions, by a quadratic programme"),
 }
 
 

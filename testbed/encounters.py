@@ -1,6 +1,7 @@
 """Drawn encounters with ice and turbulence: how often an aircraft stalls or departs, protected and not.
 
-An encounter is 120 s of one of eight scenarios from a pre-iced start. Drawn for each, by a generator of its own that
+An encounter is 120 s of one of eight scenarios from a pre-iced start; in a ninth, `full_stick`, a pilot in stratiform
+ice holds the stick nearly full back and to the right for 20 s. Drawn for each, by a generator of its own that
 nothing else uses: an excess drag up to 0.06 that sets a severity common to the airframe, and each surface's share of
 it; by the scenario: turbulence (sigma_w up to moderate), speed, and hazards of its own (the iced tailplane of the
 approach, the iced propellers of the climb, the worse wing of the hold). The seeds of development and those of what is
@@ -49,11 +50,23 @@ FLIGHT = {"ice_protection": "management", "events": [], "doublets_at": (10.0, 60
 ENCOUNTERS: dict[str, dict[str, Any]] = {
     "clear_air": {}, "stratiform": {}, "flight_010302f1": FLIGHT, "holding_asymmetric": {}, "approach_tail_ice": {},
     "climb_propeller_ice": {}, "boot_failure": {}, "large_drops": {},
+    "full_stick": {"base": "stratiform"},
 }
+STICK = (50.0, 70.0, -0.35, -0.2)  # s from and to, elevator and aileron [rad]: back and to the right, nearly all of it
 
 
 class WatchedLoop(ClosedLoop):
     """The closed loop, and in `moved` whose controls the protection changed in this step."""
+
+    pulled = False  # a pilot pulls and rolls for a while, whatever the ice
+
+    def steer(self) -> None:
+        """As `ClosedLoop.steer`; in "full_stick" the pilot takes over for a while."""
+        super().steer()
+        start, end, elevator, aileron = STICK
+        if self.pulled:
+            held = (self.measurement["time"] >= start) & (self.measurement["time"] < end)
+            self._command["elevator"][held], self._command["aileron"][held] = elevator, aileron
 
     def protect(self) -> None:
         """As `ClosedLoop.protect`."""
@@ -89,7 +102,8 @@ class Tally:
 
 def encounter(name: str, duration: float = DURATION) -> Scenario:
     """The scenario of an encounter; turbulence is drawn with everything else."""
-    return scenarios.load(name, duration=duration, **ENCOUNTERS[name], randomise={
+    changes = dict(ENCOUNTERS[name])
+    return scenarios.load(changes.pop("base", name), duration=duration, **changes, randomise={
         "parameters": {"turbulence_sigma_w": {"low": 0.0, "high": SIGMA_W}}})
 
 
@@ -97,6 +111,7 @@ def world_of(name: str, n: int, duration: float = DURATION, **options: Any) -> W
     """World of `n` encounters; options of `testbed.closed_loop.ClosedLoop`."""
     world = World(encounter(name, duration), n, lambda n, clean, dt: WatchedLoop(n, clean, dt, **options))
     world.loop.reveal(world.fleet)  # type: ignore[attr-defined]  # only an oracle looks
+    world.loop.pulled = name == "full_stick"  # type: ignore[attr-defined]
     return world
 
 

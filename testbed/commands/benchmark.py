@@ -1,4 +1,4 @@
-"""`icing benchmark`: how fast (`speed`), how well ice is told (`characterisation`)."""
+"""`icing benchmark`: how fast (`speed`), how well ice is told (`characterisation`), what protection is worth."""
 
 from __future__ import annotations
 
@@ -7,33 +7,59 @@ from typing import Any
 
 import click
 
+from icing_env.errors import InputError, nearest
 from testbed.commands.common import print_json, print_table, verb
 
-NAMES = ("speed", "characterisation")
+NAMES = ("speed", "characterisation", "protection")
 EXAMPLE = """icing benchmark speed --json
-icing benchmark characterisation --quick --figure out/reliability.png"""
+icing benchmark characterisation --quick --figure out/reliability.png
+icing benchmark protection --encounters 200 --json"""
 
 
 @verb("benchmark", EXAMPLE)
 @click.argument("name", type=click.Choice(NAMES))
-@click.option("--quick", is_flag=True, help="characterisation: few flights, to see that it works.")
+@click.option("--quick", is_flag=True, help="few flights, to see that it works (not speed).")
 @click.option("--weights", type=click.Path(path_type=Path), help="characterisation: folder of a training.")
 @click.option("--figure", type=click.Path(path_type=Path), help="characterisation: reliability curves as PNG.")
-def command(name: str, quick: bool, weights: Path | None, figure: Path | None, as_json: bool, seed: int) -> None:
+@click.option("--encounters", type=click.IntRange(min=2), help="protection: encounters per row; 1000 if omitted.")
+@click.option("--only", metavar="A,B,...", help="protection: rows of these only, such as unprotected,surfaces.")
+def command(name: str, quick: bool, weights: Path | None, figure: Path | None, encounters: int | None,
+            only: str | None, as_json: bool, seed: int) -> None:
     """Measure the testbed.
 
     `speed`: one aircraft and batches, with and without observer, one thread, beside JSBSim in the same run (if it is
     installed: the extra `peers`). `characterisation`: classes, detection, false alarms, protection, reliability, on
-    flights that no fit has seen. Seeds are fixed in the code, apart from those of the training; --seed changes nothing.
+    flights that no fit has seen. `protection`: shares of drawn encounters with ice and turbulence in which the
+    autopilot stalls or departs, unprotected, with every protection and with the true ice known; nuisance in clear air;
+    the time that a protection takes. Seeds are fixed in the code, apart from those of the training; --seed changes
+    nothing.
     """
     if name == "speed":
         _speed(as_json)
+        return
+    if name == "protection":
+        _protection(quick, encounters, only, as_json)
         return
     from testbed.characterisation.benchmark import draw, measure, tables
 
     found = measure(quick, weights, lambda what: click.echo(f"{what} ...", err=True))
     if figure is not None:
         draw(found, figure)
+    if as_json:
+        print_json(found)
+        return
+    for title, headers, rows in tables(found):
+        print_table(title, headers, rows)
+
+
+def _protection(quick: bool, encounters: int | None, only: str | None, as_json: bool) -> None:
+    from testbed.encounter_figures import WHO, measure, tables
+
+    names = tuple(name.strip() for name in only.split(",")) if only else ()
+    for name in names:
+        if name not in WHO:
+            raise InputError(f"no row '{name}' of the protection benchmark: {nearest(name, list(WHO))}")
+    found = measure(quick, encounters, lambda what: click.echo(f"{what} ...", err=True), names)
     if as_json:
         print_json(found)
         return
