@@ -49,8 +49,11 @@ def read_tables(name: str | Path, shapes: Mapping[str, tuple[int, ...]]) -> dict
 
 
 def with_tables(row: NDArray[Any], tables: dict[str, NDArray[np.float64]]) -> NDArray[Any]:
-    """A row of gains with tables beside its numbers: the fields of `row`, then one of each table's shape."""
-    types: list[Any] = [*row.dtype.descr, *((key, "f8", value.shape) for key, value in tables.items())]
+    """A row of gains with tables before its numbers: one field of each table's shape, then the fields of `row`.
+
+    Tables come first: a type that merely went on after that of `row` would pass for it in numba.
+    """
+    types: list[Any] = [*((key, "f8", value.shape) for key, value in tables.items()), *row.dtype.descr]
     out = np.zeros(1, types)
     for field in row.dtype.names or ():
         out[field] = row[field]
@@ -70,7 +73,7 @@ def scheduled(row: NDArray[Any], name: str | Path, sizes: dict[str, tuple[int, i
     grid = read_tables(name, {"grid": (len(GRID_FIELDS),)})["grid"]
     shapes = {key: (int(grid[2]), int(grid[5]), *size) for key, size in sizes.items()}
     single = {field: np.asarray(value) for field, value in zip(GRID_FIELDS, grid, strict=True)}
-    return with_tables(row, single | read_tables(name, shapes))
+    return with_tables(row, read_tables(name, shapes) | single)
 
 
 @kernel

@@ -18,7 +18,18 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from controllers.design import lqr
-from controllers.design.models import DT, FLAPS, SHORT, SPEEDS, FloatArray, Point, clean, grid
+from controllers.design.models import (
+    DT,
+    FLAPS,
+    READ_LATERAL,
+    READ_LONGITUDINAL,
+    SHORT,
+    SPEEDS,
+    FloatArray,
+    Point,
+    clean,
+    grid,
+)
 from controllers.parameters import read_parameters
 from icing_env.atmosphere import G0
 from icing_env.linearise import LATERAL
@@ -112,14 +123,20 @@ def design(parameters: NDArray[Any] | None = None) -> tuple[dict[str, FloatArray
 
 
 def compensator(tables: dict[str, FloatArray], i: int, j: int, point: Point, axis: str) -> tuple[FloatArray, ...]:
-    """A, B, C, D from readings of one axis to its surfaces, as `controllers.laws.lqg` runs them."""
+    """A, B, C, D from readings of one axis to its surfaces, as `controllers.laws.lqg` runs them.
+
+    States: of the filter, then the integrators of the surfaces.
+    """
     surfaces = 1 if axis == "longitudinal" else 2
     gain, m = tables[axis][i, j], tables[f"filter_{axis}"][i, j]
-    readings = N + surfaces
-    from_read = np.zeros((N, 4 + surfaces + surfaces - 1))  # the lateral force goes to the integrator alone
-    from_read[:, :4], from_read[:, -surfaces:] = m[:, readings:], m[:, N:readings]
-    straight = lqr.compensator(tables, i, j, point, axis)
-    feedback = -gain[:, :4]
-    a = np.block([[m[:, :N], np.zeros((N, surfaces))], [np.zeros((surfaces, N)), np.eye(surfaces)]])
-    return (a, np.vstack([from_read, straight[1]]), np.hstack([feedback @ m[:4, :N], np.eye(surfaces)]),
-            feedback @ from_read[:4])
+    before, surfaces_read, readings = m[:, :N], m[:, N:N + surfaces], m[:, N + surfaces:]
+    width = len(READ_LONGITUDINAL) if axis == "longitudinal" else len(READ_LATERAL)
+    read = np.zeros((N, width))
+    read[:, :4], read[:, width - surfaces:] = readings, surfaces_read
+    integral = np.zeros((surfaces, width))
+    if axis == "lateral":
+        integral[:, 4] = -DT*gain[:, 5]
+    integral += np.outer(-DT*gain[:, 4], read[3])
+    a = np.block([[before, np.zeros((N, surfaces))], [np.outer(-DT*gain[:, 4], before[3]), np.eye(surfaces)]])
+    return (a, np.vstack([read, integral]), np.hstack([-gain[:, :4] @ before[:4], np.eye(surfaces)]),
+            -gain[:, :4] @ read[:4])

@@ -15,7 +15,7 @@ from itertools import product
 
 import numpy as np
 
-from controllers.design.models import DT, FLAPS, SPEEDS, FloatArray, Point, clean, grid, plant
+from controllers.design.models import DT, FloatArray, Point, clean, grid, plant
 
 AXES = {"longitudinal": ("elevator",), "lateral": ("aileron", "rudder")}
 CHANGED = {"longitudinal": ("Cm_alpha", "Cm_q", "Cm_elevator"), "lateral": ("Cl_p", "Cl_aileron")}
@@ -68,15 +68,9 @@ def margins(process: System, law: System, surface: int) -> Margins:
     return Margins(float(20.0*np.log10(gain)), float(phase), float(crossover), float((1.0/abs(1.0 + loop)).max()))
 
 
-def law_at(name: str, tables: dict[str, FloatArray], i: int, j: int, point: Point, axis: str) -> System:
-    """The law as it is run at a place of the grid."""
-    return import_module(f"controllers.design.{name}").compensator(tables, i, j, point, axis)  # type: ignore[no-any-return]
-
-
-def changed(axis: str) -> Iterator[dict[str, float]]:
-    """Every combination of the derivatives of an axis at their factors."""
-    for factors in product(FACTORS, repeat=len(CHANGED[axis])):
-        yield dict(zip(CHANGED[axis], factors, strict=True))
+def changed(axis: str) -> Iterator[tuple[float, ...]]:
+    """Every combination of factors on the derivatives CHANGED of an axis."""
+    return product(FACTORS, repeat=len(CHANGED[axis]))
 
 
 @cache
@@ -85,13 +79,22 @@ def places() -> tuple[tuple[int, int, Point], ...]:
     return tuple(grid(clean()))
 
 
-def slowest(name: str, tables: dict[str, FloatArray], axis: str, factors: dict[str, float] | None = None) -> FloatArray:
-    """`decay` at every place of the grid [speeds, flaps], the aircraft changed by `factors`, the law as designed."""
-    out = np.zeros((len(SPEEDS), len(FLAPS)))
-    flown = grid(clean(**factors)) if factors else places()
-    for (i, j, point), (_i, _j, nominal) in zip(flown, places(), strict=True):
-        out[i, j] = decay(plant(point, axis), law_at(name, tables, i, j, nominal, axis))
-    return out
+@cache
+def plants(axis: str, factors: tuple[float, ...] = ()) -> tuple[System, ...]:
+    """The plant at every place of the grid, the derivatives CHANGED of the axis times `factors`."""
+    flown = grid(clean(**dict(zip(CHANGED[axis], factors, strict=True)))) if factors else places()
+    return tuple(plant(point, axis) for _i, _j, point in flown)
+
+
+def laws(name: str, tables: dict[str, FloatArray], axis: str) -> list[System]:
+    """The law as it is run at every place of the grid."""
+    module = import_module(f"controllers.design.{name}")
+    return [module.compensator(tables, i, j, point, axis) for i, j, point in places()]
+
+
+def slowest(name: str, tables: dict[str, FloatArray], axis: str, factors: tuple[float, ...] = ()) -> float:
+    """The least `decay` over the grid, the aircraft changed by `factors`, the law as designed."""
+    return min(map(decay, plants(axis, factors), laws(name, tables, axis)))
 
 
 def summary(surface: str, found: list[Margins]) -> str:
@@ -111,11 +114,11 @@ def report(name: str, tables: dict[str, FloatArray]) -> str:
     """Poles, least margins and what changed derivatives do, as plain text."""
     lines = []
     for axis, surfaces in AXES.items():
-        lines.append(f"{axis}: {verdict(slowest(name, tables, axis).min())} over the grid")
+        lines.append(f"{axis}: {verdict(slowest(name, tables, axis))} over the grid")
         for k, surface in enumerate(surfaces):
-            found = [margins(plant(p, axis), law_at(name, tables, i, j, p, axis), k) for i, j, p in places()]
-            lines.append(summary(surface, found))
-        rates = [slowest(name, tables, axis, factors).min() for factors in changed(axis)]
+            pairs = zip(plants(axis), laws(name, tables, axis), strict=True)
+            lines.append(summary(surface, [margins(process, law, k) for process, law in pairs]))
+        rates = [slowest(name, tables, axis, factors) for factors in changed(axis)]
         lines.append(f"  {', '.join(CHANGED[axis])} each at 70 and 130 %, {len(rates)} combinations: "
                      f"{verdict(min(rates))}")
     return "\n".join(lines)

@@ -1,8 +1,8 @@
 """Guidance: the outer loops that every classical law shares, from targets to pitch, bank and power.
 
 Successive loop closure (McRuer, Ashkenas & Graham, Aircraft Dynamics and Automatic Control, chapters 7-8; Stevens,
-Lewis & Johnson, Aircraft Control and Simulation, 3rd ed., section 4.6). A law's memory begins with GUIDANCE_FIELDS, its
-gains with GUIDANCE_GAINS_FIELDS; its inner loop, from pitch and bank asked for to the surfaces, is its own.
+Lewis & Johnson, Aircraft Control and Simulation, 3rd ed., section 4.6). A law's memory has GUIDANCE_FIELDS, its gains
+have GUIDANCE_GAINS_FIELDS; its inner loop, from pitch and bank asked for to the surfaces, is its own.
 
 * s = qbar_reference / qbar: surface power goes with dynamic pressure
 * vertical speed and airspeed: complementary filters of acceleration with pressure altitude and pitot, so that neither

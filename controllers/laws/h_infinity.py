@@ -35,12 +35,12 @@ from icing_env.jit import block, entry, kernel
 from icing_env.types import structured
 
 STATES = 5  # of either controller beside its integrator
-H_INFINITY = np.dtype([
-    *structured(GUIDANCE_FIELDS).descr,
-    ("elevator_trim", "f8"), ("aileron_trim", "f8"), ("rudder_trim", "f8"),  # rad, integrators
+H_INFINITY = np.dtype([  # its own first: one that began like another law's would pass for it in numba
     ("pitch", "f8", (STATES + 1,)),  # states of the pitch controller, then its surface [rad]
     ("roll", "f8", (STATES + 1,)),
     ("stacked", "f8", (STATES + 2,)),  # what the controllers' matrices multiply: states, error, rate
+    ("elevator_trim", "f8"), ("aileron_trim", "f8"), ("rudder_trim", "f8"),  # rad, integrators
+    *structured(GUIDANCE_FIELDS).descr,
 ])  # fmt: skip
 SHAPES = {"pitch": (STATES + 1, STATES + 2), "roll": (STATES + 1, STATES + 2), "integral": (2,), "yaw": (2,)}
 

@@ -30,13 +30,13 @@ from icing_env.types import structured
 
 STATES = 8  # of either filter
 LONGITUDINAL_INPUTS, LATERAL_INPUTS = 5, 6  # surfaces and readings
-LQG = np.dtype([
-    *structured(REGULATOR_FIELDS).descr,
+LQG = np.dtype([  # its own first, see REGULATOR_FIELDS
     ("theta_trim", "f8"),  # rad, at engagement, like the surfaces below
     ("elevator_start", "f8"), ("aileron_start", "f8"), ("rudder_start", "f8"),
     ("longitudinal", "f8", (STATES,)),  # m/s, rad, rad/s, rad, gust twice [rad], walks of alpha_dot and q_dot
     ("lateral", "f8", (STATES,)),  # rad, rad/s, rad/s, rad, gust twice [rad], walks of p_dot and r_dot
     ("stacked", "f8", (STATES + LATERAL_INPUTS,)),  # what the filter's matrix multiplies: estimate, surfaces, readings
+    *structured(REGULATOR_FIELDS).descr,
 ])  # fmt: skip
 SIZES = {
     "longitudinal": (1, 5), "lateral": (2, 6),

@@ -36,13 +36,13 @@ from icing_env.atmosphere import G0
 from icing_env.jit import entry, kernel
 from icing_env.types import Field, structured
 
-REGULATOR_FIELDS: list[Field] = [
-    *GUIDANCE_FIELDS,
+REGULATOR_FIELDS: list[Field] = [  # its own first: one that began like another law's would pass for it in numba
+    ("airspeed_trim", "m/s", "airspeed when the law was engaged"),
+    ("alpha_trim", "rad", "angle of attack then"),
     ("elevator_trim", "rad", "integrator of the pitch hold"),
     ("aileron_trim", "rad", "aileron's share of the lateral integrators"),
     ("rudder_trim", "rad", "rudder's share of the lateral integrators"),
-    ("airspeed_trim", "m/s", "airspeed when the law was engaged"),
-    ("alpha_trim", "rad", "angle of attack then"),
+    *GUIDANCE_FIELDS,
 ]
 LQR = structured(REGULATOR_FIELDS)
 SIZES = {"longitudinal": (1, 5), "lateral": (2, 6)}  # of the gain K at each place of the grid
