@@ -118,7 +118,7 @@ def compile_first() -> None:
 @click.option("--workers", type=click.IntRange(min=1), default=os.cpu_count() or 1, help="Processes side by side.")
 @click.option("--resume", is_flag=True, help="Go on with the runs in DIR; without, DIR must hold none.")
 @click.option("--only", default="", help="Only runs whose name holds this.")
-@click.option("--share", type=click.FloatRange(min=1e-4), default=1.0, help="Of its configuration's steps, for each run.")
+@click.option("--share", type=click.FloatRange(min=1e-4), default=1.0, help="Of each run's configured steps.")
 def main(out: Path, minutes: float, workers: int, resume: bool, only: str, share: float) -> None:
     """Learn every configuration with every seed."""
     begun = time.monotonic()

@@ -49,7 +49,7 @@ class Configuration(Strict):
     reward_scale: float = Limited(0.05, gt=0.0)  # applied before the learner sees a reward
     reward_root: bool = False  # a reward 1 - P, P weighted squares of errors, becomes 1 - sqrt(P)
     imitate: int = Limited(0, ge=0)  # updates towards the autopilot before learning from reward; not for sac
-    evaluations: int = Limited(40, gt=0)  # points of the learning curve, each a checkpoint
+    evaluations: int = Limited(20, gt=0)  # points of the learning curve, each a checkpoint
     seeds: tuple[int, ...] = (0,)  # trained by `python -m testbed.training.batch`
     env_kwargs: Surroundings
     hyperparameters: dict[str, Any] = {}
