@@ -143,4 +143,6 @@ def step(memory: NDArray[Any], command: NDArray[Any], measurement: NDArray[Any],
         hold_pitch(a, c, m, adv, g, theta, scale, dt)
         hold_bank(a, c, m, t, adv, g, scale, dt)
         damp_yaw(a, c, m, g, scale, dt)
+        a.elevator_trim = elevator + (a.elevator_trim - elevator)/a.Cm_elevator  # a weak surface is trimmed further
+        a.aileron_trim = aileron + (a.aileron_trim - aileron)/a.Cl_aileron
         answer_clean(a, c, m, f, g, c.elevator - elevator, c.aileron - aileron, c.rudder - rudder)
