@@ -21,6 +21,7 @@ from testbed.training import configuration, learner
 from testbed.training.checkpoint import finished
 from testbed.training.imitation import returns
 from testbed.training.run import Order, begin, resumed
+from testbed.training.ship import ship
 
 ROOT = Path(__file__).resolve().parent.parent
 SMALL = {"ppo": {"n_steps": 8, "batch_size": 32, "n_epochs": 2},
@@ -82,6 +83,17 @@ class Break:
         self.left -= 1
         if self.left <= 0 and steps < total:
             raise BrokenOff
+
+
+def test_a_shipped_policy_takes_its_whole_curve_along(tmp_path):
+    begin(order("ppo", steps=64), tmp_path/"run").learn()
+    path = ship(tmp_path/"run", tmp_path)
+    policy = load(path)
+    assert path.name == "ppo_targets_protected_0.safetensors"
+    assert policy.card["curve"] == json.loads((tmp_path/"run"/"curve.json").read_text())
+    assert policy.card["steps_learned"] == 64 and policy.card["command"] == "icing train"
+    same = tensors(tmp_path/"run"/"policy.safetensors")
+    assert all(np.array_equal(array, same[name]) for name, array in tensors(path).items())
 
 
 def test_a_checkpoint_holds_no_pickle(tmp_path):
