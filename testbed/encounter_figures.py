@@ -20,7 +20,7 @@ WHO: dict[str, dict[str, Any]] = {
     **{name: {"shield": name} for name in PROTECTIONS},
     "oracle": {"estimator": "oracle"},
 }
-CALLS = 20_000  # of a filter, for its 99th percentile
+CALLS, ROUNDS = 20_000, 20  # of a filter, for its 99th percentile
 RATE_BATCH, RATE_ROUNDS = 1024, 5
 
 
@@ -62,7 +62,8 @@ def filter_time(shield: str) -> dict[str, float]:
         start = time.perf_counter()
         call()
         spent[k] = time.perf_counter() - start
-    return {"median": 1e6*float(np.median(spent)), "p99": 1e6*float(np.percentile(spent, 99))}
+    rounds = 1e6*spent.reshape(ROUNDS, -1)  # what else the machine does falls into some of them
+    return {"median": float(np.median(rounds)), "p99": float(np.median(np.percentile(rounds, 99, axis=1)))}
 
 
 def rates() -> dict[str, float]:
