@@ -10,9 +10,10 @@ from controlled import cruise, free, steer
 from safetensors.numpy import save_file
 
 from controllers.choice import law
+from controllers.design import h_infinity, robustness
 from controllers.design import lqr as lqr_design
-from controllers.design import robustness
 from controllers.design.__main__ import main
+from controllers.design.mixed_sensitivity import generalised
 from controllers.design.models import DT, FLAPS, SHORT, SPEEDS, clean, side_force, steady
 from controllers.laws import sis
 from controllers.schedule import at, place, read_tables
@@ -53,6 +54,21 @@ def test_the_shipped_h_infinity_controllers_are_those_of_the_design():
     for axis in ("pitch", "roll"):  # their states may come in another basis
         one, other = (robustness.response(parts(t[axis]), omega) for t in (tables, made))
         np.testing.assert_allclose(one, other, rtol=1e-3, atol=1e-4)
+
+
+@pytest.mark.parametrize(("axis", "process"), [("pitch", h_infinity.pitching), ("roll", h_infinity.rolling)])
+def test_the_shipped_h_infinity_controllers_keep_their_bounds(axis, process):
+    """Without slycot: the weighted loop of the reduced, discrete controller has nearly the gamma it was made for."""
+    k, omega = h_infinity.weights(), np.geomspace(0.01, 60.0, 200)
+    plant = generalised(process(steady(clean(), k["airspeed"], 0.0), k), axis, k)
+    tables = read_tables("h_infinity", {**law("h_infinity").SHAPES, "gamma": (2,)})
+    which = ("pitch", "roll").index(axis)
+    controller = robustness.response(parts(tables[axis]), omega)
+    controller[:, 0, 0] += tables["integral"][which]/(1j*omega)
+    p = np.moveaxis(plant(1j*omega), -1, 0)
+    inner = controller @ p[:, 3:, :3]/(1.0 - controller @ p[:, 3:, 3:])
+    largest = np.linalg.norm(p[:, :3, :3] + p[:, :3, 3:] @ inner, 2, axis=(1, 2)).max()
+    assert 0.8 < largest/tables["gamma"][which] < 1.1
 
 
 def parts(matrix):

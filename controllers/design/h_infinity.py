@@ -72,17 +72,18 @@ def rolling(point: Point, k: dict[str, float]) -> StateSpace:
 def design(parameters: NDArray[Any] | None = None) -> tuple[dict[str, FloatArray], list[str]]:
     """Tables of both controllers, and gamma of each; of the clean aircraft if no PARAMETERS row is given.
 
-    `pitch`, `roll`: matrices of `synthesise`; `integral`: gains of both integrators [1/s]; `yaw`: K_r, K_ay_integral.
+    `pitch`, `roll`: matrices of `synthesise`; `integral`: gains of both integrators [1/s]; `yaw`: K_r, K_ay_integral;
+    `gamma`: of both, for the record.
     """
     k = weights()
     point = steady(clean() if parameters is None else parameters, k["airspeed"], 0.0)
     if point is None:
         raise InputError(f"h_infinity: no steady flight at an equivalent airspeed of {k['airspeed']} m/s")
-    tables = {"yaw": np.array([k["K_r"], k["K_ay_integral"]]), "integral": np.zeros(2)}
+    tables = {"yaw": np.array([k["K_r"], k["K_ay_integral"]]), "integral": np.zeros(2), "gamma": np.zeros(2)}
     notes = []
     for i, (axis, process) in enumerate((("pitch", pitching(point, k)), ("roll", rolling(point, k)))):
         gain, tables[axis], gamma = synthesise(process, axis, k)
-        tables["integral"][i] = gain[0]
+        tables["integral"][i], tables["gamma"][i] = gain[0], gamma
         notes.append(f"{axis}: gamma {gamma:.2f}, integrator {gain[0]:.3f} 1/s, {ORDER} states beside it")
     return tables, notes
 
