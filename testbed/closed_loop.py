@@ -135,6 +135,10 @@ class ClosedLoop:
             self._adapt()
         if self.managing and self.boots:
             self._operate()
+        self.limit()
+
+    def limit(self) -> None:
+        """Keep the command within the limits."""
         if self.protecting:
             self._protect()
 

@@ -68,10 +68,10 @@ class WatchedLoop(ClosedLoop):
             held = (self.measurement["time"] >= start) & (self.measurement["time"] < end)
             self._command["elevator"][held], self._command["aileron"][held] = elevator, aileron
 
-    def protect(self) -> None:
-        """As `ClosedLoop.protect`."""
+    def limit(self) -> None:
+        """As `ClosedLoop.limit`."""
         before = self._command.copy()
-        super().protect()
+        super().limit()
         now = self._command
         self.moved = np.zeros(len(now), bool)
         for name in ("elevator", "aileron", "throttle_left", "throttle_right", "flap"):

@@ -43,13 +43,17 @@ def _loop(options: dict[str, Any]) -> LoopFactory:
 def make(**options: Any) -> TwinOtterEnv:
     """One aircraft. Options: those of `TwinOtterEnv`, and those of `testbed.closed_loop.ClosedLoop`."""
     compile_beside("testbed.environments")
-    return TwinOtterEnv(loop=_loop(options), **options)
+    env = TwinOtterEnv(loop=_loop(options), **options)
+    reveal(env.world)
+    return env
 
 
 def make_vector(num_envs: int = 1, **options: Any) -> TwinOtterVectorEnv:
     """Many aircraft. Options: those of `TwinOtterVectorEnv` and of `testbed.closed_loop.ClosedLoop`."""
     compile_beside("testbed.environments")
-    return TwinOtterVectorEnv(num_envs, loop=_loop(options), **options)
+    envs = TwinOtterVectorEnv(num_envs, loop=_loop(options), **options)
+    reveal(envs.world)
+    return envs
 
 
 if __name__ == "__main__":  # see `icing_env.jit.compile_beside`

@@ -182,4 +182,4 @@ def level(q: Qualities) -> int:
         (q.roll <= 1.4, q.roll <= 3.0, q.roll <= 10.0),
         (q.spiral >= 20.0, q.spiral >= 8.0, q.spiral >= 4.0),
     )
-    return max(4 - sum(np.cumprod(step)) for step in steps)
+    return max((*step, True).index(True) + 1 for step in steps)

@@ -105,7 +105,7 @@ class Oracle:
         failed = np.stack([np.broadcast_to(p[name], len(state)) for name in FAILED], axis=1)
         told = self.advisory[rows]
         detected = (eta.max(axis=1) > self.tuning["detect_severity"][0]*self.tuning["eta_severe"][0])
-        tell(told, eta, np.ones(len(state)), detected, failed > 0.5, self.tuning)
+        tell(told, eta, np.zeros_like(eta), np.ones(len(state)), detected, failed > 0.5, self.tuning)
         self.estimate[rows], self.advisory[rows] = said, told
 
 

@@ -52,14 +52,13 @@ class Characteriser:
         if self.reference is not None:
             own = np.broadcast_to(self.reference, (len(self.severity), self.reference.shape[-1]))
             online.refer(self.kept, own[rows], rows)
-        self._tell(rows)
 
     def observe(self) -> None:
         """Gather a sample; judge and tell once a second."""
         online.step(self.kept, self.severity, self.estimate, self.measurement, self.command, self.clean,
                     self.character, self.dt)
         if self.kept.clock[0] < self.dt:
-            self._tell(slice(None))
+            self._tell()
             values, std, good = derivatives(self.kept.evidence, self.measurement, self.clean)
             self.held = np.stack([*values.values(), *std.values(), good], axis=1)
         self.known[:] = self.estimate
@@ -73,10 +72,13 @@ class Characteriser:
         return {f"sense_{name}": array for name, array in online.arrays(self.kept).items()} | {
             "sense_severity": self.severity, "sense_held": self.held, "sense_known": self.known}
 
-    def _tell(self, rows: NDArray | slice) -> None:
+    def _tell(self) -> None:
+        """What is judged goes into the advisory; before the first judgement the drag speaks."""
+        rows = np.flatnonzero(self.severity["judged"] > 0.0)
         seen, told = self.severity[rows], self.advisory[rows]
         eta = np.stack([seen[f"eta_{part}"] for part in PARTS], axis=1)
         failed = np.stack([(seen[f"p_failed_{part}"] > FAILED) & (seen[f"tested_{part}"] > 0.0)
                            for part in PARTS], axis=1)
-        tell(told, eta, seen["p_iced"], seen["ice_detected"] > 0.5, failed, self.tuning)
+        std = np.stack([seen[f"eta_{part}_std"] for part in PARTS], axis=1)
+        tell(told, eta, std, seen["p_iced"], seen["ice_detected"] > 0.5, failed, self.tuning)
         self.advisory[rows] = told

@@ -58,7 +58,7 @@ def change_elevator(b: Any, m: Any, frame: Any, asked: float, alpha: float, q: f
     la, ma, mq, me = l_clean*b.CL_alpha, ma_clean*b.Cm_alpha, mq_clean*b.Cm_q, me_clean*b.Cm_elevator
     le = -force*frame.CZ_elevator*b.Cm_elevator  # the tail's lift keeps the share that its moment keeps
     trace = mq_clean - l_clean - (mq - la)
-    determinant = -l_clean*mq_clean - z*ma_clean + la*mq + z*ma
+    determinant = (la*mq + z*ma) - (l_clean*mq_clean + z*ma_clean)
     # K B = trace, K adj(A) B = determinant, with B = (-le, me)
     first, second = -(mq*le + z*me), ma*le - la*me
     size = -le*second - me*first

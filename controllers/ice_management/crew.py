@@ -52,7 +52,8 @@ def log(time: NDArray[np.float64], advisory: NDArray[Any], period: float = 1.0, 
         period: s between looks.
         again: s of silence after which the same words are news; a number in them is not.
     """
-    told, last = [], {}
+    told: list[tuple[float, Message]] = []
+    last: dict[str, float] = {}
     look = -math.inf
     for now, row in zip(time, advisory, strict=True):
         if now - look < period - 1e-6:

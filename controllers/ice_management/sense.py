@@ -74,13 +74,15 @@ def characterise(a: Any, e: Any, frame: Any, g: Any, dt: float) -> None:
     a.since_detection = (a.since_detection + dt)*a.ice_detected
 
 
-def tell(advisory: NDArray[Any], eta: NDArray[np.float64], sure: NDArray[np.float64], detected: NDArray[np.bool_],
-         failed: NDArray[np.bool_], tuning: NDArray[Any]) -> None:
+def tell(advisory: NDArray[Any], eta: NDArray[np.float64], std: NDArray[np.float64], sure: NDArray[np.float64],
+         detected: NDArray[np.bool_], failed: NDArray[np.bool_], tuning: NDArray[Any]) -> None:
     """Take the ice surface by surface from somebody else, in place; from then on drag alone decides nothing.
+
+    Ice that the drag had shown before stays detected for as long as it is more likely than not.
 
     Args:
         advisory: ADVISORY rows [n].
-        eta: severity of each of SENSED_PARTS [n, 4].
+        eta, std: severity of each of SENSED_PARTS and its standard error [n, 4].
         sure: probability that the ice matters [n].
         detected: ice is believed [n].
         failed: protection of each part is believed to have failed [n, 4].
@@ -90,7 +92,8 @@ def tell(advisory: NDArray[Any], eta: NDArray[np.float64], sure: NDArray[np.floa
     for i, part in enumerate(SENSED_PARTS):
         advisory[f"severity_{part}"] = np.maximum(eta[:, i], 0.0)
         advisory[f"failed_{part}"] = failed[:, i]
-    worst = eta[:, :3].max(axis=1)/tuning["eta_severe"][0]
-    advisory["severity"] = np.clip(sure*worst, 0.0, 1.0)
-    advisory["confidence"] = np.abs(2.0*sure - 1.0)
-    advisory["ice_detected"] = detected
+    worst, rows = eta[:, :3].argmax(axis=1), np.arange(len(eta))
+    severe = tuning["eta_severe"][0]
+    advisory["severity"] = np.clip(sure*eta[rows, worst]/severe, 0.0, 1.0)
+    advisory["confidence"] = 1.0/(1.0 + (std[rows, worst]/(severe*tuning["confidence_half"][0]))**2)
+    advisory["ice_detected"] = detected | ((advisory["ice_detected"] > 0.5) & (sure > 0.5))

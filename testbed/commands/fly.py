@@ -25,6 +25,7 @@ def command(scenario: str, controller: str, effects: tuple[str, ...], duration: 
 
     The record holds what instruments read and what was commanded; the truth is in a file of its own.
     """
+    from controllers.ice_management import crew
     from icing_env.effects import parse
     from icing_env.scenario import load
     from testbed.flight import fly
@@ -36,11 +37,16 @@ def command(scenario: str, controller: str, effects: tuple[str, ...], duration: 
     if out is not None:
         write(flight, out)
     figures = summary(flight)
+    told = crew.log(flight.truth["time"], flight.advisory)
     if as_json:
-        print_json({"scenario": scenario, "seed": seed, "record": out and str(out), **figures})
+        print_json({"scenario": scenario, "seed": seed, "record": out and str(out), **figures,
+                    "crew": [{"time": t, "level": m.level, "text": m.text} for t, m in told]})
         return
     print_table(f"{scenario}, seed {seed}", {"figure": "left", "value": "right"},
                 [[name.replace("_", " "), f"{value:.4g}" if isinstance(value, float) else str(value)]
                  for name, value in figures.items()])
+    if told:
+        print_table("what the crew was told", {"s": "right", "level": "left", "message": "left"},
+                    [[f"{t:.0f}", m.level, m.text] for t, m in told])
     if out is not None:
         click.echo(f"record: {out}, truth: {out.with_suffix('.truth.csv')}")
