@@ -49,7 +49,7 @@ class Job:
 
 
 def jobs(only: str = "") -> list[Job]:
-    """Every configured run whose label holds `only`: first seeds first, the slow algorithms before the quick one."""
+    """Every configured run whose label begins with `only`: first seeds first, the slow algorithms before the quick one."""
     found = []
     for algorithm in ("sac", "recurrent_ppo", "ppo"):
         for name in configuration.read(algorithm):
@@ -57,7 +57,7 @@ def jobs(only: str = "") -> list[Job]:
             for k, seed in enumerate(chosen.seeds):
                 found.append((k if algorithm == "ppo" else -1, Job(algorithm, name, seed)))
     found.sort(key=lambda pair: pair[0])
-    return [job for _, job in found if only in job.label]
+    return [job for _, job in found if job.label.startswith(only)]
 
 
 def finished(job: Job, out: Path) -> bool:
@@ -117,7 +117,7 @@ def compile_first() -> None:
 @click.option("--minutes", type=float, default=60.0, show_default=True, help="Wall clock for this call.")
 @click.option("--workers", type=click.IntRange(min=1), default=os.cpu_count() or 1, help="Processes side by side.")
 @click.option("--resume", is_flag=True, help="Go on with the runs in DIR; without, DIR must hold none.")
-@click.option("--only", default="", help="Only runs whose name holds this.")
+@click.option("--only", default="", help="Only runs whose name begins so.")
 @click.option("--share", type=click.FloatRange(min=1e-4), default=1.0, help="Of each run's configured steps.")
 def main(out: Path, minutes: float, workers: int, resume: bool, only: str, share: float) -> None:
     """Learn every configuration with every seed."""

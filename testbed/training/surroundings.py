@@ -32,6 +32,7 @@ class Fleets(VecEnv):
                  reward_scale: float, root: bool = False) -> None:
         from gymnasium.spaces import Box
 
+        self.render_mode = None
         self.parts, self.centre, self.per_scale = parts, centre, per_scale
         self.reward_scale, self.root = reward_scale, root
         self.bounds = np.cumsum([0, *(part.num_envs for part in parts)])
