@@ -49,7 +49,7 @@ class Job:
 
 
 def jobs(only: str = "") -> list[Job]:
-    """Every configured run whose label begins with `only`: first seeds first, the slow algorithms before the quick one."""
+    """Every configured run whose label begins with `only`: first seeds first, slow algorithms before quick ones."""
     found = []
     for algorithm in ("sac", "recurrent_ppo", "ppo"):
         for name in configuration.read(algorithm):
