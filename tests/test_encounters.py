@@ -56,3 +56,25 @@ def test_a_row_has_shares_with_intervals_and_a_table():
     shown = tables({"encounters": 3, "seeds": "development", "rows": [found], "filter_us": {},
                     "steps_per_s": {"observed": 1.0, "controlled": 1.0, "ratio": 1.0}})
     assert shown[0][2][0][:2] == ["clear_air", "surfaces"]
+
+
+def lost(name, logic, blind, n, duration, **options):
+    """Share of encounters that depart when the ice management knows too little, with and without upset logic."""
+    world = encounters.world_of(name, n, duration, boots=False, **options)
+    tuning = world.loop.management_tuning
+    for key in blind:
+        tuning[key] = 9.0
+    if not logic:
+        tuning["upset_share"], tuning["roll_strange"], tuning["tail_near"] = 9.0, 99.0, -9.0
+    return float(encounters.fly(world, encounters.seeds_of(name, "development", n)).departed.mean())
+
+
+def test_a_tailplane_stall_that_nobody_expected_is_recovered():
+    blind = ("tail_severity", "tail_loss")  # full flap is allowed, whatever the tail carries
+    assert lost("approach_tail_ice", False, blind, 12, 70.0) > 0.5
+    assert lost("approach_tail_ice", True, blind, 12, 70.0) == 0.0
+
+
+def test_a_roll_upset_of_an_aircraft_believed_clean_is_recovered():
+    without, logic = (lost("holding_asymmetric", logic, (), 64, 120.0, observer=False) for logic in (False, True))
+    assert logic < without - 0.03 and logic < 0.02
