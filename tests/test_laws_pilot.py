@@ -65,7 +65,7 @@ def test_what_is_flown_is_the_transfer_function(axis, field, column, frequency):
     sine, cosine, _ = np.linalg.lstsq(basis, answer[late], rcond=None)[0]
     expected = 0.02*complex(pilot.transfer(gains, axis, np.array(frequency)))
     expected *= np.sqrt(0.5*1.0087*72.0**2/2560.0)**-1  # density of `cruise` is not that of the reference
-    assert complex(sine, cosine) == pytest.approx(expected, rel=0.02 + 0.02*frequency)  # a sample early or late
+    assert complex(sine, cosine) == pytest.approx(expected, rel=0.02 + 0.03*frequency)  # a sample or so early
 
 
 def test_nothing_moves_before_the_delay_is_over():

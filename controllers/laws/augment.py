@@ -7,6 +7,7 @@ proposed with ice management systems (docs/controllers.md, laws).
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -63,14 +64,14 @@ def roll_power(m: Any, f: Any) -> float:
 
 @kernel
 def trusted(std: float, clean: float, excitation: float, health: float, g: Any) -> bool:
-    """True where an estimate may be followed; False for what is not a number."""
+    """True where an estimate may be followed; False where its error is not a number."""
     return health == 1.0 and excitation >= g.excitation_min and 0.0 < std <= g.error_max*abs(clean)
 
 
 @kernel
 def followed(share: float, value: float, clean: float, trust: bool, g: Any, dt: float) -> float:
     """Share of its clean value that a derivative keeps, one step on: towards the estimate's, slewed, or as it was."""
-    if not trust:
+    if not (trust and math.isfinite(value)):
         return share
     change = value/clean - 1.0
     change *= clip(abs(change)/g.change_ignored - 1.0, 0.0, 1.0)

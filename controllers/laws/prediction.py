@@ -22,6 +22,11 @@ Array = NDArray[np.float64]
 SAMPLE, BLOCKS = 0.1, (1, 1, 2, 3, 5, 8)  # s; samples that each move lasts: 2 s ahead
 LOOKS = tuple(range(1, sum(BLOCKS), 2))  # samples at which the limited state is held to its limits
 TOLERANCE = 1e-9
+# where bounds stand: of the moves and the slack, of the changes, of the limited state upwards, downwards
+MOVES = len(BLOCKS)
+CHANGES = slice(MOVES + 1, 2*MOVES + 1)
+UP = slice(CHANGES.stop, CHANGES.stop + len(LOOKS))
+DOWN = slice(UP.stop, UP.stop + len(LOOKS))
 
 
 @dataclass(frozen=True)
@@ -105,13 +110,12 @@ def solve(p: Plan, q: Array, low: float, high: float, first: float, later: float
     """
     if not np.isfinite(q).all():
         return float("nan")
-    moves, looks = len(BLOCKS), len(LOOKS)
-    at = p.carried @ q
-    upper = np.concatenate((np.full(moves + 1, high), np.full(moves, later), np.full(looks, above),
-                            np.full(looks, np.inf)))
-    lower = np.concatenate((np.full(moves + 1, low), np.full(moves, -later), np.full(looks, -np.inf),
-                            np.full(looks, -below)))
-    lower[moves], upper[moves], lower[moves + 1], upper[moves + 1] = 0.0, np.inf, -first, first
+    moves, at = len(BLOCKS), p.carried @ q
+    lower, upper = np.full((2, 1 + moves + len(at)), np.inf)
+    lower *= -1.0
+    lower[:moves], upper[:moves], lower[moves] = low, high, 0.0
+    lower[CHANGES], upper[CHANGES], upper[UP], lower[DOWN] = -later, later, above, -below
+    lower[moves + 1], upper[moves + 1] = -first, first
     upper[moves + 1:] -= at
     lower[moves + 1:] -= at
     x = p.free @ q
