@@ -16,6 +16,7 @@ class Choice:
     module: str
     description: str
     kind: str = "classical"  # classical, adaptive
+    episodes: int = 1_000_000  # most that a comparison flies; fewer for one that takes long
 
     def load(self) -> ModuleType:
         """The module: `init(n)`; a law has `default_gains` and `step`, a protection `load_tuning` and `protect`."""
@@ -28,7 +29,7 @@ LAWS: dict[str, Choice] = {
                  "adaptive"),
     "scheduled": Choice("controllers.laws.scheduled", "the autopilot, its gains scheduled by the observer's estimate",
                         "adaptive"),
-    "mpc": Choice("controllers.laws.mpc", "linear model-predictive control of pitch and bank under the moved limits"),
+    "mpc": Choice("controllers.laws.mpc", "linear model-predictive control of pitch and bank under the moved limits", episodes=4),
     "pilot": Choice("controllers.laws.pilot", "a pilot flying attitude: delay, lead, lag, muscles and remnant"),
     "indi": Choice("controllers.laws.indi", "incremental nonlinear dynamic inversion of pitch and roll", "adaptive"),
     "sis": Choice("controllers.laws.sis", "the Smart Icing System's published attitude and heading holds"),

@@ -63,7 +63,7 @@ def _learned() -> dict[str, Controller]:
             for group, names in groups.items()}
 
 
-CONTROLLERS = {name: Controller(name, law.description, law.kind, name) for name, law in LAWS.items()} | {
+CONTROLLERS = {name: Controller(name, law.description, law.kind, name, law.episodes) for name, law in LAWS.items()} | {
     "hands_off": Controller("hands_off", "controls held at the trim", "classical", None),
     "adapted": Controller("adapted", "autopilot, adapted by what observer and characteriser find", "adaptive",
                           "autopilot", adaptation=True, sense="characterise"),

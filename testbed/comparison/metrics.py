@@ -14,6 +14,7 @@ from scipy import stats
 
 from testbed.comparison import flight_figures as flight
 from testbed.comparison import ice_figures as ice
+from testbed.comparison.modal import FIGURES
 from testbed.comparison.trace import INTERVAL, Trace
 
 FloatArray = NDArray[np.float64]
@@ -34,6 +35,11 @@ class Metric:
     of: Callable[[Trace, int], float]
     share: bool = False
     managed: bool = False
+
+
+def ended(name: str) -> Callable[[Trace, int], float]:
+    """A figure of the aircraft at the episode's end."""
+    return lambda t, i: float(t.modal[name][i]) if name in t.modal else float("nan")
 
 
 METRICS: dict[str, Metric] = {
@@ -61,6 +67,8 @@ METRICS: dict[str, Metric] = {
     "altitude_settling": Metric("s", 4, flight.settling("altitude")),
     "heading_overshoot": Metric("1", 4, flight.overshoot("heading")),
     "heading_settling": Metric("s", 4, flight.settling("heading")),
+    **{name: Metric("1", 4, ended(name), share=name == "level_lost") for name in (
+        *(f"{figure}_off" for figure in FIGURES), "level_lost")},
     "elevator_activity": Metric("rad/s", 4, flight.activity("elevator")),
     "aileron_activity": Metric("rad/s", 4, flight.activity("aileron")),
     "rudder_activity": Metric("rad/s", 4, flight.activity("rudder")),

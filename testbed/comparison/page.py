@@ -19,7 +19,7 @@ with the interquartile mean beside. Truth is used for scores only.
 """
 KEY = {1: ("detection_delay", "severity_error"), 2: ("ice_carried", "boot_cycles"),
        3: ("losses", "stalled", "exceedances", "worst_alpha_margin"),
-       4: ("altitude_rms", "heading_rms", "elevator_activity")}  # fmt: skip
+       4: ("altitude_rms", "heading_rms", "short_period_off", "elevator_activity")}  # fmt: skip
 
 
 def write(result: Mapping[str, Any], provenance: Mapping[str, str], folder: Path) -> Path:

@@ -5,7 +5,7 @@ The truth in here is for scores alone; observer and controllers have had their t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from icing_env.atmosphere import G0, GAS_CONSTANT
 from icing_env.tasks import REASONS
 from icing_env.types import SURFACES
 from icing_env.world import World
+from testbed.comparison.modal import modal
 from testbed.oracle import quasi_steady
 
 FloatArray = NDArray[np.float64]
@@ -41,6 +42,7 @@ class Trace:
         alive: [samples, n], False after an episode's end.
         reason: why each ended early, "" if it did not [n].
         stepped: the task asked for steps of altitude and heading.
+        modal: of `testbed.comparison.modal` [n].
     """
 
     time: FloatArray
@@ -48,6 +50,7 @@ class Trace:
     alive: NDArray[np.bool_]
     reason: tuple[str, ...]
     stepped: bool = False
+    modal: dict[str, FloatArray] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> FloatArray:
         return self.values[name]
@@ -82,7 +85,7 @@ def trace(world: World, seeds: list[int]) -> Trace:
     flown = step//every + 1
     values = {f"command_{name}" if kind == "command" else name: array[:flown] for (kind, name), array in kept.items()}
     return Trace(np.arange(flown, dtype=np.float64)*INTERVAL, values | _ice(values, world), alive[:flown],
-                 tuple(REASONS[k] for k in reason), world.scenario.task.kind == "steps")
+                 tuple(REASONS[k] for k in reason), world.scenario.task.kind == "steps", modal(world, ~ended))
 
 
 def rms(values: FloatArray, t: Trace, i: int) -> float:
