@@ -136,7 +136,8 @@ def test_intervals():
 def test_everybody_meets_the_same_case_and_the_truth_about_ice_starts_alike(tmp_path: Path):
     path = tmp_path / "tiny.toml"
     path.write_text(TINY)
-    ((_, case),) = suite.load(path).cases()
+    ((_, long),) = suite.load(path).cases()
+    case = long.model_copy(update={"duration": 1.0})
     flown = [trace(make_world(case, 2, who, protection), [5, 6])
              for who in CONTROLLERS for protection in (True, False)]
     for t in flown:
