@@ -1,6 +1,6 @@
 """Function 4 in figures: how near the adaptation brings an iced aircraft to the clean one.
 
-`python -m testbed.adaptation_study` prints the tables of docs/controllers.md.
+`icing benchmark adaptation` prints the tables of docs/controllers.md.
 
 * flying qualities (`testbed.flying_qualities`) of the true iced aircraft at 64 m/s without adaptation, with the
   oracle's gains, and with gains from the estimate after one doublet set flown by the autopilot in turbulence
@@ -9,8 +9,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,9 @@ AIRSPEED = 64.0  # m/s: every case but one of wing and tail can be held in level
 FIGURES = ("short_period", "short_period_damping", "pitch", "turn", "yaw", "dutch_roll", "roll")
 LIGHT, CALM = 2.0, 0.5  # m/s, sigma_w: light turbulence at 7500 ft (MIL-F-8785C figure 7), and nearly none
 FIRST_SEED = 61_000_000
+SOURCES = {  # sigma_w m/s, doublets flown
+    "sigma_w 0.5, doublets": (CALM, True), "sigma_w 2, doublets": (LIGHT, True), "sigma_w 2, autopilot": (LIGHT, False),
+}
 STEPS = {  # s, rad
     "theta": ((5.0, 0.05), (15.0, -0.03), (25.0, 0.0)),
     "phi": ((10.0, 0.35), (20.0, -0.35), (30.0, 0.0)),
@@ -129,23 +133,53 @@ def attitude(who: str, cases: tuple[tuple[str, float], ...], sigma_w: float, cop
     return {name: np.sqrt(total/count).reshape(len(cases), copies).mean(axis=1) for name, total in sums.items()}
 
 
-def _show(title: str, judged: list[Judged]) -> None:
-    print(title)
-    for name, (plain, with_it, nearer) in worst(judged).items():
-        print(f"  {name}: worst {100*plain:.0f} % without, {100*with_it:.0f} % with; {100*nearer:.0f} % nearer")
-    print(f"  level 1 with it in {np.mean([lv == 1 for j in judged for lv in j.levels]):.0%} of cases, "
-          f"without in {np.mean([j.level_unadapted == 1 for j in judged]):.0%}")
+def measure(quick: bool = False, progress: Callable[[str], None] = lambda what: None) -> dict[str, Any]:
+    """Every figure, as `icing benchmark adaptation --json` prints them; relative deviations from the clean aircraft.
 
-
-if __name__ == "__main__":
-    _show("oracle", list(judge(found(0.0, 1, "oracle"))))
-    for sigma, doublets in ((CALM, True), (LIGHT, True), (LIGHT, False)):
-        _show(f"estimate, sigma_w {sigma} m/s, {'one doublet set' if doublets else 'no doublets'}",
-              list(judge(found(sigma, 4, doublets=doublets))))
+    Args:
+        quick: one flight of each case instead of four, and of estimates only that in light turbulence.
+        progress: called with what is flown next.
+    """
+    copies = 1 if quick else 4
+    out: dict[str, Any] = {"cases": [f"{name} {eta}" for name, eta in CASES], "airspeed": AIRSPEED}
+    progress("the oracle")
+    out["flying_qualities"] = {"oracle": _figures(list(judge(found(0.0, 1, "oracle"))))}
+    for name, (sigma_w, doublets) in list(SOURCES.items())[-2 if quick else 0:]:
+        progress(f"estimate, {name}")
+        out["flying_qualities"][name] = _figures(list(judge(found(sigma_w, copies, doublets=doublets))))
     iced = tuple(case for case in CASES if case[1] == 0.2)
-    clean = attitude("autopilot", (("clean", 0.0),), CALM, 4)
+    progress("attitude")
+    clean = attitude("autopilot", (("clean", 0.0),), CALM, copies)
+    out["attitude_error"] = {}
     for who in ("autopilot", "adapted", "oracle"):
-        flown = attitude(who, iced, CALM, 4)
-        for name, error in flown.items():
-            print(f"{name}, {who}: " + ", ".join(
-                f"{case} {100*(e/clean[name][0] - 1.0):+.0f} %" for (case, _), e in zip(iced, error, strict=True)))
+        flown = attitude(who, iced, CALM, copies)
+        out["attitude_error"][who] = {name: {case: float(e/clean[name][0] - 1.0) for (case, _), e in
+                                             zip(iced, error, strict=True)} for name, error in flown.items()}
+    return out
+
+
+def _figures(judged: list[Judged]) -> dict[str, Any]:
+    figures = {name: {"worst_without": plain, "worst_with": with_it, "nearer": nearer}
+               for name, (plain, with_it, nearer) in worst(judged).items()}
+    return {"figures": figures, "level_1_with": float(np.mean([lv == 1 for j in judged for lv in j.levels])),
+            "level_1_without": float(np.mean([j.level_unadapted == 1 for j in judged]))}
+
+
+def tables(measured: dict[str, Any]) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
+    """Title, headers and rows of each table."""
+    headers = {"gains from": "left", **{name.replace("_", " "): "right" for name in FIGURES}, "level 1": "right"}
+    found_by = measured["flying_qualities"]
+    plain = found_by["oracle"]
+    rows = [["no adaptation", *(f"{100*plain['figures'][name]['worst_without']:.0f} %" for name in FIGURES),
+             f"{100*plain['level_1_without']:.0f} %"]]
+    for who, what in found_by.items():
+        rows.append([who, *(f"{100*what['figures'][name]['worst_with']:.0f} %" for name in FIGURES),
+                     f"{100*what['level_1_with']:.0f} %"])
+    yield "worst deviation from the clean aircraft, 64 m/s", headers, rows
+    rows = [[who, *(f"{100*what['figures'][name]['nearer']:.0f} %" for name in FIGURES), ""]
+            for who, what in found_by.items()]
+    yield "nearer to clean than unadapted, root mean square", headers, rows
+    cases = list(measured["attitude_error"]["autopilot"]["theta"])
+    yield "attitude error against the clean aircraft's, eta 0.2", {"": "left", **dict.fromkeys(cases, "right")}, [
+        [f"{who}, {name}", *(f"{100*error[case]:+.0f} %" for case in cases)]
+        for who, by in measured["attitude_error"].items() for name, error in by.items()]

@@ -15,7 +15,8 @@ from estimators.characterise.model import PARTS
 
 SENSES = ("drag", "characterise")  # by excess drag first, in the ice management itself; or by the characteriser
 RIVAL = "network"
-FAILED = 0.5  # probability of failure above which the crew is told, after at least one inflation
+SIGMAS, LEFT_BEHIND, TRIALS = 2.0, 0.05, 2  # of the more iced half wing; eta; inflations (all assumed)
+FAILED = 0.95  # probability of failure above which the crew is told; ice that grows before the look counts against
 
 
 class Characteriser:
@@ -35,8 +36,7 @@ class Characteriser:
         self.dt, self.estimate, self.advisory, self.tuning = dt, estimate, advisory, tuning
         self.clean, self.character, self.reference = clean_from(clean), online.load(RIVAL), reference
         self.kept, self.severity = online.init(n)
-        self.known = estimate.copy()  # the estimate, with lift and pitch derivatives from the evidence where it is good
-        self.held = np.zeros((n, 2*len(TOLD) + 1))
+        self.known = estimate.copy()  # of the last judgement, lift and pitch from the evidence where that is good
         self.measurement: NDArray[Any] = np.zeros(0)
         self.command: NDArray[Any] = np.zeros(0)
         self.reset(np.arange(n))
@@ -48,7 +48,7 @@ class Characteriser:
     def reset(self, rows: NDArray) -> None:
         """Begin anew in the given rows; an aircraft's own clean reference stays."""
         online.reset(self.kept, self.severity, rows)
-        self.held[rows], self.known[rows] = 0.0, self.estimate[rows]
+        self.known[rows] = self.estimate[rows]
         if self.reference is not None:
             own = np.broadcast_to(self.reference, (len(self.severity), self.reference.shape[-1]))
             online.refer(self.kept, own[rows], rows)
@@ -57,28 +57,34 @@ class Characteriser:
         """Gather a sample; judge and tell once a second."""
         online.step(self.kept, self.severity, self.estimate, self.measurement, self.command, self.clean,
                     self.character, self.dt)
-        if self.kept.clock[0] < self.dt:
-            self._tell()
-            values, std, good = derivatives(self.kept.evidence, self.measurement, self.clean)
-            self.held = np.stack([*values.values(), *std.values(), good], axis=1)
+        if self.kept.clock[0] >= self.dt:
+            return
+        self._tell()
         self.known[:] = self.estimate
-        good = self.held[:, -1] > 0.0
-        for i, name in enumerate(TOLD):
-            self.known[name][good], self.known[f"{name}_std"][good] = self.held[good, i], self.held[good, len(TOLD) + i]
+        values, std, good = derivatives(self.kept.evidence, self.measurement, self.clean)
+        for name in TOLD:
+            self.known[name][good], self.known[f"{name}_std"][good] = values[name][good], std[name][good]
         self.known["excitation_longitudinal"][good] = 1.0
 
     def memory(self) -> dict[str, NDArray]:
         """What must be kept to go on later."""
         return {f"sense_{name}": array for name, array in online.arrays(self.kept).items()} | {
-            "sense_severity": self.severity, "sense_held": self.held, "sense_known": self.known}
+            "sense_severity": self.severity, "sense_known": self.known}
 
     def _tell(self) -> None:
         """What is judged goes into the advisory; before the first judgement the drag speaks."""
         rows = np.flatnonzero(self.severity["judged"] > 0.0)
         seen, told = self.severity[rows], self.advisory[rows]
         eta = np.stack([seen[f"eta_{part}"] for part in PARTS], axis=1)
-        failed = np.stack([(seen[f"p_failed_{part}"] > FAILED) & (seen[f"tested_{part}"] > 0.0)
+        failed = np.stack([(seen[f"p_failed_{part}"] > FAILED) & (seen[f"tested_{part}"] >= TRIALS)
                            for part in PARTS], axis=1)
         std = np.stack([seen[f"eta_{part}_std"] for part in PARTS], axis=1)
+        failed[:, :2] |= unlike(eta[:, :2], std[:, :2], seen["tested_left_wing"])
         tell(told, eta, std, seen["p_iced"], seen["ice_detected"] > 0.5, failed, self.tuning)
         self.advisory[rows] = told
+
+
+def unlike(eta: NDArray[np.float64], std: NDArray[np.float64], tested: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Half wings [n, 2] that keep their ice over inflations which clear the other: one boot of the pair has failed."""
+    more = eta - eta[:, ::-1]
+    return np.asarray((more > SIGMAS*std) & (eta > LEFT_BEHIND) & (tested[:, None] >= TRIALS))

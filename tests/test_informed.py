@@ -10,6 +10,7 @@ from icing_env.errors import InputError
 from icing_env.types import SENSED_PARTS
 from testbed.environments import loop_factory, make
 from testbed.flight import make_world
+from testbed.sensing import unlike
 
 ICE = {"left_wing": 0.12, "right_wing": 0.2, "htail": 0.15, "vtail": 0.1, "other": 0.1}
 
@@ -93,3 +94,25 @@ def test_a_reference_of_its_own_is_kept_over_episodes():
 def test_an_unknown_way_to_sense_is_refused():
     with pytest.raises(InputError, match="characterise"):
         make_world(scenario.load("clear_air"), sense="characterize")
+
+
+@pytest.mark.parametrize(("left", "right", "tested", "failed"), [
+    (0.08, 0.01, 2, (True, False)), (0.01, 0.08, 3, (False, True)), (0.08, 0.07, 5, (False, False)),
+    (0.08, 0.01, 1, (False, False)), (0.04, 0.0, 5, (False, False)),
+])
+def test_a_half_wing_that_keeps_its_ice_while_the_other_loses_it_has_no_boot(left, right, tested, failed):
+    found = unlike(np.array([[left, right]]), np.full((1, 2), 0.017), np.array([float(tested)]))
+    assert tuple(found[0]) == failed
+
+
+def test_a_failed_boot_is_told_and_working_ones_are_not():
+    told = []
+    for failed in (1.0, 0.0):
+        case = scenario.load("stratiform", duration=400.0, parameters={
+            "boot_failed_left_wing": failed, "turbulence_sigma_w": 1.0}, task={"kind": "hold"})
+        world = make_world(case, 6, sense="characterise")
+        world.reset(seeds=range(6), initial={"eta": {"left_wing": 0.1, "right_wing": 0.1, "htail": 0.08}})
+        for _ in range(world.limit):
+            world.step()
+        told.append([float(world.loop.advisory[f"failed_{part}"].mean()) for part in SENSED_PARTS])
+    assert told[0][0] > 0.4 and sum(told[0][1:]) == 0 and sum(told[1]) == 0

@@ -10,7 +10,7 @@ import click
 from icing_env.errors import InputError, nearest
 from testbed.commands.common import print_json, print_table, verb
 
-NAMES = ("speed", "characterisation", "protection")
+NAMES = ("speed", "characterisation", "protection", "adaptation")
 EXAMPLE = """icing benchmark speed --json
 icing benchmark characterisation --quick --figure out/reliability.png
 icing benchmark protection --encounters 200 --json"""
@@ -31,7 +31,8 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
     installed: the extra `peers`). `characterisation`: classes, detection, false alarms, protection, reliability, on
     flights that no fit has seen. `protection`: shares of drawn encounters with ice and turbulence in which the
     autopilot stalls or departs, unprotected, with every protection and with the true ice known; nuisance in clear air;
-    the time that a protection takes. Seeds are fixed in the code, apart from those of the training; --seed changes
+    the time that a protection takes. `adaptation`: flying qualities of iced aircraft with the control laws adapted,
+    against the clean aircraft's. Seeds are fixed in the code, apart from those of the training; --seed changes
     nothing.
     """
     if name == "speed":
@@ -40,11 +41,25 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
     if name == "protection":
         _protection(quick, encounters, only, as_json)
         return
+    if name == "adaptation":
+        _adaptation(quick, as_json)
+        return
     from testbed.characterisation.benchmark import draw, measure, tables
 
     found = measure(quick, weights, lambda what: click.echo(f"{what} ...", err=True))
     if figure is not None:
         draw(found, figure)
+    if as_json:
+        print_json(found)
+        return
+    for title, headers, rows in tables(found):
+        print_table(title, headers, rows)
+
+
+def _adaptation(quick: bool, as_json: bool) -> None:
+    from testbed.adaptation_study import measure, tables
+
+    found = measure(quick, lambda what: click.echo(f"{what} ...", err=True))
     if as_json:
         print_json(found)
         return
