@@ -147,3 +147,13 @@ def test_pitch_limit_rises_with_the_power_in_reserve():
     m["throttle_left"] = m["throttle_right"] = 0.5, 1.0
     a = managed(m, 30.0)
     assert a["pitch_limit"][0] - a["pitch_limit"][1] == pytest.approx(7000.0/(4951.0*G0), rel=0.01)
+
+
+def test_at_high_speed_the_limit_load_lowers_the_limit_of_alpha():
+    m, p = cruise(2), airframe()[0]
+    m["airspeed"] = 72.0, 100.0
+    a = managed(m)
+    assert a["alpha_limit"][0] == pytest.approx(0.191) and a["load_factor_limit"][1] == pytest.approx(3.8)
+    pressure = 0.5*77500.0/(287.05287*268.0)*100.0**2
+    lift = pressure*p["wing_area"]*-(p["CZ_0"] + p["CZ_alpha"]*a["alpha_limit"][1])
+    assert lift/(p["mass"]*G0) == pytest.approx(3.8, rel=1e-6)

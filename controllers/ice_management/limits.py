@@ -9,7 +9,7 @@ The severity of the worse half wing, with as much of its standard error as `doub
 * CL_max = CL at the iced stall angle, slope lost with severity or, where the elevator has shown more, as estimated;
   V_s = sqrt(2 m g/(rho S CL_max)), airspeed_limit = factor V_s
 * bank_limit = acos(1/n_max), n_max = (V/(factor V_s))^2
-* load_factor_limit = lift at alpha_limit over weight
+* load_factor_limit = lift at alpha_limit over weight, at most the limit load, which at high speed lowers alpha_limit
 * pitch_limit = alpha_limit + the climb angle that full power would sustain at this airspeed
 * flap_limit: `controllers.ice_management.upsets`
 
@@ -93,6 +93,8 @@ def limit_envelope(a: Any, m: Any, e: Any, frame: Any, g: Any, dt: float) -> Non
     lift = max(flap_lift - frame.CZ_0 - kept*frame.CZ_alpha*stall, 0.1)
     density, speed = air_density(m), airspeed_of(m)
     weight = 2.0*frame.mass*G0/(density*frame.wing_area)
+    loaded = (g.load_max*weight/(speed*speed) - flap_lift + frame.CZ_0)/-frame.CZ_alpha
+    a.alpha_limit = min(a.alpha_limit, max(loaded, 0.0))
     stall_speed = math.sqrt(weight/lift)
     a.airspeed_limit = stall_speed*(g.stall_factor_clean + (g.stall_factor_iced - g.stall_factor_clean)*iced)
     level = stall_speed*(g.bank_factor_clean + (g.bank_factor_iced - g.bank_factor_clean)*iced)
