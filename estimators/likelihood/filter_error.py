@@ -28,6 +28,7 @@ from estimators.likelihood.simulate import filtered_flight
 from estimators.regression.equations import EXCITED, SURFACES, movement
 from estimators.signals.coefficients import Airframe, airframe_of
 from estimators.signals.data_checks import check
+from estimators.signals.instruments import calibrated
 from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
@@ -66,7 +67,7 @@ def identify(record: FlightRecord, start: float | None = None, default: Airframe
     Raises:
         InputError: the record is refused by `data_checks.check` or lacks the channels of both axes.
     """
-    record = check(record)
+    record = calibrated(check(record))
     grid = common_grid(record)
     airframe, first = airframe_of(record, default), starting_values(record, start, default)
     result: dict[str, Estimate] = {}

@@ -28,6 +28,7 @@ from estimators.regression.preparation import prepare
 from estimators.regression.stepwise import PRACTICE, Criteria, Stepwise, choose, stepwise
 from estimators.signals.coefficients import Airframe, airframe_of, thrust
 from estimators.signals.data_checks import check
+from estimators.signals.instruments import calibrated
 from estimators.signals.gust_level import turbulence_warnings
 from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
@@ -143,7 +144,7 @@ def _candidates(
 
 def pose(record: FlightRecord, mode: str, default: Airframe | None = None, half: int | None = None) -> Problem:
     """The equations of a record; arguments and errors as for `identify`."""
-    record = check(record)
+    record = calibrated(check(record))
     grid = common_grid(record)
     axes = {axis: [n for n in needed if n not in grid.values] for axis, needed in NEEDED.items()}
     if all(axes.values()):
