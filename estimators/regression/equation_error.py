@@ -24,8 +24,9 @@ from estimators.regression.equations import (
     fit_equation,
     movement,
 )
-from estimators.regression.preparation import prepare
+from estimators.regression.preparation import noise_of, prepare
 from estimators.regression.stepwise import PRACTICE, Criteria, Stepwise, choose, stepwise
+from estimators.regression.zero_lift import zero_lift_drag
 from estimators.signals.coefficients import Airframe, airframe_of, thrust
 from estimators.signals.data_checks import check
 from estimators.signals.instruments import calibrated
@@ -45,6 +46,7 @@ class Problem:
         moved: rms of each surface about its trend, rad.
         thrust_known: whether drag and axial force are free of it.
         warnings: by axis, where gusts bias what regression finds.
+        noise: variance of the noise in regressors by name.
     """
 
     data: Mapping[str, FloatArray]
@@ -52,6 +54,7 @@ class Problem:
     moved: Mapping[str, float]
     thrust_known: bool
     warnings: Mapping[str, str]
+    noise: Mapping[str, float]
 
     @property
     def equations(self) -> tuple[Equation, ...]:
@@ -105,8 +108,11 @@ def identify(
             model = choose(*_candidates(equation, data, terms, rows))[0] if terms else ()
             entered = tuple(term for term in model if term in terms)
         found = fit_equation(
-            equation, data, rows, dict(problem.moved), f"equation error, {mode}", entered, mode == "textbook"
+            equation, data, rows, dict(problem.moved), f"equation error, {mode}", entered, mode == "textbook",
+            problem.noise,
         )
+        if equation.target == "CD" and problem.flown(equation):
+            found["CD_0"] = zero_lift_drag(data, rows, f"equation error, {mode}", mode == "textbook")
         result.update(problem.finished(equation, found))
     return result
 
@@ -150,14 +156,16 @@ def pose(record: FlightRecord, mode: str, default: Airframe | None = None, half:
     if all(axes.values()):
         lacks = "; ".join(f"{axis} needs {', '.join(names)}" for axis, names in axes.items())
         raise InputError(f"record '{record.meta.name}' lacks columns: {lacks}")
-    data, reach = prepare(grid, record, airframe_of(record, default), mode, half)
+    airframe = airframe_of(record, default)
+    data, reach = prepare(grid, record, airframe, mode, half)
     surfaces = [name for pair in SURFACES.values() for name in pair if name in grid.values]
     moved = {name: movement(grid.time, grid.values[name], grid.good((name,))) for name in surfaces}
     rows = {
         equation.target: _usable(grid, equation, reach) & np.isfinite(data[equation.target])
         for equation in EQUATIONS if not axes[equation.axis] and equation.target in data
     }  # fmt: skip
-    return Problem(data, rows, moved, thrust(grid.values) is not None, turbulence_warnings(grid, "regression"))
+    return Problem(data, rows, moved, thrust(grid.values) is not None, turbulence_warnings(grid, "regression"),
+                   noise_of(grid, airframe, mode, reach))  # fmt: skip
 
 
 def _usable(grid: Grid, equation: Equation, half: int) -> NDArray[np.bool_]:
