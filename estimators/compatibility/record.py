@@ -20,8 +20,8 @@ from estimators.compatibility.readings import NEEDED, candidates_of, readings_of
 from estimators.compatibility.selection import Found, select
 from estimators.estimate import Estimate
 from estimators.signals.data_checks import check
-from estimators.signals.instruments import calibrated
 from estimators.signals.gust_level import LENGTH
+from estimators.signals.instruments import calibrated
 from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import DataProblem, FlightRecord, FloatArray

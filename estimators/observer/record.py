@@ -17,8 +17,7 @@ from estimators.signals.coefficients import thrust
 from estimators.signals.data_checks import check
 from estimators.signals.gust_level import turbulence_warnings
 from estimators.signals.resample import Grid, common_grid
-from icing_env.errors import InputError
-from icing_env.record import FlightRecord, FloatArray
+from icing_env.record import FlightRecord
 from icing_env.types import ESTIMATE, unit_of
 
 AXIS = dict(zip(CHANNELS, ("longitudinal",) * 3 + ("lateral",) * 3, strict=True))

@@ -29,11 +29,16 @@ from estimators.regression.stepwise import PRACTICE, Criteria, Stepwise, choose,
 from estimators.regression.zero_lift import zero_lift_drag
 from estimators.signals.coefficients import Airframe, airframe_of, thrust
 from estimators.signals.data_checks import check
-from estimators.signals.instruments import calibrated
 from estimators.signals.gust_level import turbulence_warnings
+from estimators.signals.instruments import calibrated
 from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
+
+# Downwash reaches the tail tail_arm/V late; a moment by q stands for that to first order only. What the rest comes to
+# in doublets, as a share of each derivative: the mean error over calm simulated flights (development flights of
+# testbed.coverage).
+DOWNWASH = {"Cm_alpha": 0.008, "Cm_q": 0.014, "Cm_elevator": 0.018}
 
 
 @dataclass(frozen=True)
@@ -63,11 +68,17 @@ class Problem:
 
     def finished(self, equation: Equation, found: dict[str, Estimate]) -> dict[str, Estimate]:
         """Estimates of an equation with the warning of its axis; refused where they contain thrust not recorded."""
-        found = {name: replace(e, warning=self.warnings.get(equation.axis, "")) for name, e in found.items()}
+        told = self.warnings.get(equation.axis, "")
+        found = {name: replace(e, warning=told, std_error=float(np.hypot(e.std_error, self._misfit(name) * e.estimate)))
+                 for name, e in found.items()}  # fmt: skip
         if self.thrust_known or equation.target not in ("CD", "CX"):
             return found
         why = "thrust was not recorded and cannot be told from drag"
         return {name: replace(e, identifiable=False, why=why) for name, e in found.items()}
+
+    def _misfit(self, name: str) -> float:
+        """Share of a derivative that the equation itself may be wrong by, where noise is allowed for as well."""
+        return DOWNWASH.get(name, 0.0) if self.noise else 0.0
 
     def flown(self, equation: Equation) -> bool:
         """Whether a surface of the equation's axis moved: without it products of noise and drift would compete."""
