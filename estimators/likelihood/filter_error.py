@@ -20,12 +20,13 @@ import numpy as np
 from estimators.estimate import Estimate
 from estimators.likelihood.descent import Point, descend
 from estimators.likelihood.equations import FIRST_GUST, STATES, VANE
-from estimators.likelihood.inputs import OUTPUTS, flown, white_noise
+from estimators.likelihood.inputs import OUTPUTS, flown
 from estimators.likelihood.model import COUNT, NAMES, Model, model, quasi_steady
 from estimators.likelihood.output_error import FEW, MOST, axes, best_flight, r_squared, starting_values
 from estimators.likelihood.report import Found, estimates
 from estimators.likelihood.simulate import filtered_flight
 from estimators.regression.equations import EXCITED, SURFACES, movement
+from estimators.regression.noisy_regressors import white_noise
 from estimators.signals.coefficients import Airframe, airframe_of
 from estimators.signals.data_checks import check
 from estimators.signals.instruments import calibrated, calibration

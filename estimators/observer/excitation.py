@@ -93,7 +93,7 @@ def hearing(
 def heard(memory: Any, tuning: Any, airframe: Any, out: Any) -> None:
     """How much each of the six channels took in of every sample of a run, into `out` (N, 6).
 
-    memory: N rows with the fields of SEEN; tuning, airframe: one row each.
+    memory: N rows with the field `energy`; tuning, airframe: one row each.
     """
     for k in range(len(memory)):
         whole = hearing(tuning[0], shares(memory[k], tuning[0], airframe[0]), 1.0)

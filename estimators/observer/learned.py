@@ -21,6 +21,7 @@ from estimators.signals.resample import Grid
 from icing_env.errors import InputError
 from icing_env.record import FloatArray
 
+ENERGY = np.dtype([("energy", "f8", (7,))])  # all that the gate reads of a memory
 # Channels that stand in regressors: the last word of a parameter's name.
 MEASURED = ("alpha", "beta", "p", "q", "r", "elevator", "aileron", "rudder")
 
@@ -66,7 +67,9 @@ def learned(run: History, c: int, airframe: NDArray[np.void], noise: dict[str, f
     if c == 0:
         return fit, np.zeros(1)
     weight = np.zeros((len(memory), 6))
-    heard(memory, run.tuning, airframe, weight)
+    energy = np.zeros(len(memory), ENERGY)
+    energy["energy"] = memory["energy"]
+    heard(energy, run.tuning, airframe, weight)
     root = np.sqrt(np.where(good, weight[:, c], 0.0))
     part_rows, part_target = rows * root[:, None], target * root
     if np.count_nonzero(root) <= 2 * COUNT[c]:

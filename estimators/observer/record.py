@@ -12,7 +12,7 @@ from estimators.estimate import Estimate
 from estimators.observer.layout import CHANNELS, COUNT, FIRST, PARAMETER_NAMES, SEEN_NAMES
 from estimators.observer.learned import History, learned, noise_of
 from estimators.observer.measurements import absent, airframe_of_record, measurements
-from estimators.regression.equations import EXCITED, LARGEST_RATIO, SURFACES, movement
+from estimators.regression.equations import DOWNWASH, EXCITED, LARGEST_RATIO, SURFACES, movement
 from estimators.signals.coefficients import thrust
 from estimators.signals.data_checks import check
 from estimators.signals.gust_level import turbulence_warnings
@@ -20,6 +20,7 @@ from estimators.signals.resample import Grid, common_grid
 from icing_env.record import FlightRecord
 from icing_env.types import ESTIMATE, unit_of
 
+__all__ = ["FAR", "STARTS", "History", "Method", "histories", "identify"]
 AXIS = dict(zip(CHANNELS, ("longitudinal",) * 3 + ("lateral",) * 3, strict=True))
 EXTRAPOLATED = 0.2  # lift coefficient: nearest a record must come to zero lift for CD_0 to be its own (assumed)
 STARTS = (0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6)  # of the clean aircraft: seven, as in the paper's Figs. 23-26 (assumed)
@@ -106,7 +107,8 @@ def identify(
     The standard error is that of least squares on the rows that the observer learned from (behind its filter; the
     accelerometer's where there is one), corrected for coloured residuals: the scatter to be expected from what the
     record does not explain. It is not what the recursion holds for it, which rests on the tuning alone
-    (`History.parameter`). A record with gusts carries a warning. A parameter has converged if starts far apart end
+    (`History.parameter`). Of methods without errors of their own what noise in the regressors took is put back
+    (`learned`). A record with gusts carries a warning. A parameter has converged if starts far apart end
     close together, and is refused if not.
     """
     record = check(record)
@@ -127,6 +129,7 @@ def identify(
                 value, name = float(run.memory["theta"][-1, i]), PARAMETER_NAMES[i]
                 if not method.own_errors:
                     value += put_back[i - FIRST[c]]
+                    error = float(np.hypot(error, DOWNWASH.get(name, 0.0) * value))
                 why = _why_not(name, channel, moved) or _why_not_converged(run, far, i, len(grid.time))
                 if not why and not name.endswith("_0") and not error <= LARGEST_RATIO * abs(value):
                     why = f"its standard error {error:.2g} exceeds a third of the estimate {value:.2g}"

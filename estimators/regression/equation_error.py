@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from estimators.estimate import Estimate
 from estimators.regression.equations import (
+    DOWNWASH,
     EQUATIONS,
     EXCITED,
     NEEDED,
@@ -34,11 +35,6 @@ from estimators.signals.instruments import calibrated
 from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
-
-# Downwash reaches the tail tail_arm/V late; a moment by q stands for that to first order only. What the rest comes to
-# in doublets, as a share of each derivative: the mean error over calm simulated flights (development flights of
-# testbed.coverage).
-DOWNWASH = {"Cm_alpha": 0.008, "Cm_q": 0.014, "Cm_elevator": 0.018}
 
 
 @dataclass(frozen=True)

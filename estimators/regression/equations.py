@@ -19,6 +19,10 @@ from estimators.regression.noisy_regressors import compensated
 from icing_env.record import FloatArray
 
 EXCITED = np.radians(0.25)  # rms of a surface about its trend below which it has not moved (assumed)
+# Downwash reaches the tail tail_arm/V late; a moment by q stands for that to first order only. What the rest comes to
+# in doublets, as a share of each derivative: the mean error over calm simulated flights (development flights of
+# testbed.coverage).
+DOWNWASH = {"Cm_alpha": 0.008, "Cm_q": 0.014, "Cm_elevator": 0.018}
 LARGEST_CORRELATION = 0.9  # Klein & Morelli, section 5.5
 LARGEST_RATIO = 1.0 / 3.0  # standard error over estimate; beyond it the parameter is dropped
 
