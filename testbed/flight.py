@@ -206,9 +206,21 @@ def _record(kept: dict[str, NDArray[Any]], world: World, seed: int) -> FlightRec
     meta = RecordMeta(
         aircraft=s.aircraft, flight=s.name, mass=float(p["mass"]), cg=(0.0, 0.0, 0.0),
         inertia=tuple(float(p[f"inertia_{a}"]) for a in ("xx", "yy", "zz", "xz")),  # type: ignore[arg-type]
-        notes=f"simulated: scenario {s.name}, seed {seed}", name=s.name,
+        sensors=_sensors(p, world.dt), notes=f"simulated: scenario {s.name}, seed {seed}", name=s.name,
         geometry=Geometry(float(p["wing_area"]), float(p["span"]), float(p["chord"])))
     return FlightRecord(channels=channels, meta=meta)
+
+
+def _sensors(p: Any, dt: float) -> dict[str, Any]:
+    """What calibration knows of the instruments, as a record's side file declares it; empty for perfect ones.
+
+    Lags as a slow change shows them: a lag that takes in the newest value once a step is late by dt (1 - g)/g.
+    """
+    lags = {"alpha": p["vane_lag"], "beta": p["vane_lag"], "airspeed": p["pitot_lag"]}
+    known = {name: {"lag": float(dt/np.expm1(dt/lag))} for name, lag in lags.items() if lag > 0.0}
+    if p["boom_gain"] > 0.0:
+        known["alpha"] = known.get("alpha", {}) | {"bending": float(p["boom_gain"])}
+    return known
 
 
 def _sampled(time: NDArray[np.float64], period: float) -> NDArray[np.bool_]:

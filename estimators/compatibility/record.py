@@ -21,6 +21,7 @@ from estimators.compatibility.selection import Found, select
 from estimators.estimate import Estimate
 from estimators.signals.data_checks import check
 from estimators.signals.gust_level import LENGTH
+from estimators.signals.instruments import calibrated
 from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import DataProblem, FlightRecord, FloatArray
@@ -76,7 +77,7 @@ def check_compatibility(record: FlightRecord, wind: bool = False, largest_scale:
         InputError: the record is refused by `data_checks.check`, lacks time, airspeed, alpha, q, theta, ax or az, or
             its motion cannot be followed.
     """
-    record = check(record)
+    record = calibrated(check(record))
     grid = common_grid(record)
     lacking = [name for name in NEEDED if name not in grid.values]
     if lacking:

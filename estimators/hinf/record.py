@@ -12,7 +12,8 @@ from estimators.estimate import Estimate
 from estimators.hinf.tuning import default_tuning
 from estimators.observer import record as runs
 from estimators.observer.layout import SEEN_NAMES
-from estimators.observer.record import STARTS, History, Method
+from estimators.observer.learned import History
+from estimators.observer.record import STARTS, Method
 from icing_env.record import FlightRecord
 
 __all__ = ["METHOD", "STARTS", "History", "histories", "history", "identify"]

@@ -20,14 +20,16 @@ import numpy as np
 from estimators.estimate import Estimate
 from estimators.likelihood.descent import Point, descend
 from estimators.likelihood.equations import FIRST_GUST, STATES, VANE
-from estimators.likelihood.inputs import OUTPUTS, flown, white_noise
+from estimators.likelihood.inputs import OUTPUTS, flown
 from estimators.likelihood.model import COUNT, NAMES, Model, model, quasi_steady
 from estimators.likelihood.output_error import FEW, MOST, axes, best_flight, r_squared, starting_values
 from estimators.likelihood.report import Found, estimates
 from estimators.likelihood.simulate import filtered_flight
 from estimators.regression.equations import EXCITED, SURFACES, movement
+from estimators.regression.noisy_regressors import white_noise
 from estimators.signals.coefficients import Airframe, airframe_of
 from estimators.signals.data_checks import check
+from estimators.signals.instruments import calibrated, calibration
 from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
@@ -46,12 +48,14 @@ ALONG, ACROSS = {"longitudinal": 0.005, "lateral": 0.0}, 1e-6
 # what the instruments of the simulation have, so that records smoothed by their owner do not count as exact).
 RESOLUTION = {"longitudinal": (1e-4, 1e-4, 1e-4, 0.003, 0.003), "lateral": (1e-4, 1e-4, 1e-4, 1e-4, 0.003)}
 WIDE = 3.0  # of the logarithm of an intensity
-KNOWN = {"scale": 0.03, "lag": 0.03, "az": 0.1, "ay": 0.1, "lift": 0.3}  # by the last word of a name: 1, s, m/s2, 1
+KNOWN = {"scale": 0.03, "lag": 0.03, "az": 0.1, "ay": 0.1, "lift": 0.05}  # by the last word of a name: 1, s, m/s2, 1
 # What the model of the gust leaves unexplained in the pitching moment, as a share of each derivative: the mean error
 # over simulated flights in turbulence (development flights of testbed.coverage), whose cause is not known. It enters
 # the standard error in so far as the gust exceeds FELT, m/s, and is said beyond SAID.
-MISFIT = {"CZ_alpha": 0.015, "CZ_q": 0.05, "CZ_elevator": 0.04, "Cm_alpha": 0.06, "Cm_q": 0.037, "Cm_elevator": 0.024}
+MISFIT = {"CZ_alpha": 0.015, "CZ_q": 0.05, "CZ_elevator": 0.04, "Cm_alpha": 0.045, "Cm_q": 0.045, "Cm_elevator": 0.028}
 FELT, SAID = 0.15, 0.3
+VANES = ("alpha_lag", "beta_lag", "gust_lag")
+TOLD = 0.003  # s: what is not known of the lag of a vane whose lag the record declares (assumed)
 LOG_STEP, LARGEST_LOG, WIDENED, FIRST_STEPS = 0.05, 1.0, 4.0, 10
 NEAR = 0.3  # standard errors that may be left to go: intensities that a record hardly shows are found slowly
 
@@ -67,33 +71,37 @@ def identify(record: FlightRecord, start: float | None = None, default: Airframe
         InputError: the record is refused by `data_checks.check` or lacks the channels of both axes.
     """
     record = check(record)
+    known = "alpha" in calibration(record.meta.sensors).lags
+    record = calibrated(record)
     grid = common_grid(record)
     airframe, first = airframe_of(record, default), starting_values(record, start, default)
+    first |= {"gust_lag": 0.0} if known else {}
     result: dict[str, Estimate] = {}
     for axis in axes(grid, record.meta.name):
         flight = flown(grid, airframe, axis)
         starts = tuple(n for n in ("start_w", "start_q", "start_theta", "start_v", "start_p", "start_r", "start_phi"))
-        likelihood = begin(model(flight, first, starts, gusts=True), model(flight, first), grid)
+        likelihood = begin(model(flight, first, starts, gusts=True), model(flight, first), grid, known)
         moved = any(movement(grid.time, grid.values[n], grid.good((n,))) >= EXCITED for n in SURFACES[axis])
         result.update(estimates(likelihood.found(MOST if moved else FEW), grid, METHOD))
     return result
 
 
-def begin(plan: Model, free: Model, grid: Grid) -> Likelihood:
+def begin(plan: Model, free: Model, grid: Grid, known: bool = False) -> Likelihood:
     """The likelihood of `plan` at the likelier of two starts.
 
     One is where the plan stands, with noise as the second differences of the channels show it, widened; the other where
     a few steps of output error on `free` lead, with what they leave over as noise, which is better in calm air.
+    `known`: the vanes' lag was declared, and taken out.
     """
     flight, names = plan.flown, OUTPUTS[plan.flown.axis]
     there = [name for name, column in zip(names, flight.measured.T, strict=True) if np.isfinite(column).any()]
     noise = [max(white_noise(grid.values[name]) * WIDENED / flight.thin, 1e-12) for name in there]
-    starts = [Likelihood(plan, np.concatenate((plan.theta0, np.log([GUST, DRIVE, *noise]))))]
+    starts = [Likelihood(plan, np.concatenate((plan.theta0, np.log([GUST, DRIVE, *noise]))), known)]
     best, _ = best_flight(free, FIRST_STEPS)
     values = dict(zip(free.free_names, best.theta, strict=True))
     theta = np.array([values.get(name, value) if name[0] == "C" else value
                       for name, value in zip(plan.free_names, plan.theta0, strict=True)])  # fmt: skip
-    starts.append(Likelihood(plan, np.concatenate((theta, np.log([GUST, DRIVE, *best.noise])))))
+    starts.append(Likelihood(plan, np.concatenate((theta, np.log([GUST, DRIVE, *best.noise]))), known))
     return min(starts, key=lambda start: float(start.costs(start.start[None])[0]))
 
 
@@ -101,11 +109,13 @@ def begin(plan: Model, free: Model, grid: Grid) -> Likelihood:
 class Likelihood:
     """Of a model's free parameters, then the logarithms of gust intensity, drive and noise variances.
 
-    `start` (p,): where the search begins, and about which the intensities are known beforehand.
+    `start` (p,): where the search begins, and about which the intensities are known beforehand. `known`: whether the
+    vanes' lag was declared.
     """
 
     plan: Model
     start: FloatArray
+    known: bool = False
 
     @property
     def there(self) -> list[int]:
@@ -131,7 +141,9 @@ class Likelihood:
     @property
     def spread(self) -> FloatArray:
         """Standard deviations of what is known beforehand; infinite for the derivatives."""
-        of = [KNOWN.get(name.split("_")[-1], np.inf) if name[0] != "C" else np.inf for name in self.plan.free_names]
+        known = {**KNOWN, **(dict.fromkeys(VANES, TOLD) if self.known else {})}
+        of = [known.get(name, known.get(name.split("_")[-1], np.inf)) if name[0] != "C" else np.inf
+              for name in self.plan.free_names]  # fmt: skip
         return np.array([*of, *[WIDE] * (2 + len(self.there))])
 
     def _prior(self, thetas: FloatArray) -> FloatArray:
@@ -185,5 +197,5 @@ def _warning(plan: Model, gust: float) -> str:
     """A sentence where gusts are strong enough to bias the pitching moment."""
     if plan.flown.axis != "longitudinal" or gust < SAID:
         return ""
-    return (f"in vertical gusts of {gust:.2f} m/s filter error finds Cm_alpha about 9 %, Cm_q 6 % and "
+    return (f"in vertical gusts of {gust:.2f} m/s filter error finds Cm_alpha about 4 %, Cm_q 5 % and "
             "Cm_elevator 3 % off in simulation (1 m/s); the standard errors are widened by that")  # fmt: skip

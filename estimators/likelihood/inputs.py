@@ -14,6 +14,7 @@ from estimators.likelihood.equations import (
     ROW_LONGITUDINAL,
     TAIL_CHORDS,
 )
+from estimators.regression.noisy_regressors import white_noise
 from estimators.signals.coefficients import Airframe, dynamic_pressure, thrust
 from estimators.signals.differentiate import low_pass
 from estimators.signals.resample import Grid
@@ -106,12 +107,6 @@ def scale_lengths(altitude: float) -> tuple[float, float]:
     share = min(max(altitude / FOOT - 1000.0, 0.0), 1000.0) / 1000.0
     across, down = (FOOT * (length + share * (1750.0 - length)) for length in low)
     return across, down
-
-
-def white_noise(signal: FloatArray) -> float:
-    """Variance of the noise on a signal (N,), from its second differences; their median sets quick moves aside."""
-    second = np.abs(np.diff(signal, 2))
-    return float((np.median(second) / 0.6745) ** 2 / 6.0) if len(second) else 0.0
 
 
 def _common(values: dict[str, FloatArray], dt: float, airframe: Airframe) -> dict[str, FloatArray]:

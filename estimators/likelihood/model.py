@@ -35,6 +35,8 @@ TYPICAL = {"alpha_scale": 0.1, "beta_scale": 0.1, "alpha_lag": 0.05, "theta_lag"
            "beta_lag": 0.05, "phi_lag": 0.05, "gust_lag": 0.05, "bias_az": 0.1,
            "bias_ay": 0.1, "start_w": 0.5, "start_v": 0.5}  # fmt: skip
 CM_ALPHADOT = -8.0  # JSBSim's DHC-6 (configs/aircraft/twin_otter.toml); the record cannot tell it from Cm_q
+TAIL_LIFT = 1.0 / 1.1  # of the lift that all the damping would need: wing and body damp a tenth as much as the tail
+#                        (Etkin & Reid, section 5.5)
 SMALL, STEP = 0.02, 0.01  # typical size of what is not named above; difference step over value or typical size
 
 
@@ -95,8 +97,8 @@ def model(flown: Flown, start: dict[str, float], fixed: tuple[str, ...] = (), gu
     if "Cm_alphadot" not in start and flown.axis == "longitudinal":
         base[names.index("Cm_alphadot")] = CM_ALPHADOT
     if flown.axis == "longitudinal":
-        base[names.index("tail_lift")] = 1.0
-    base[names.index("gust_lag")] = VANE_LAG
+        base[names.index("tail_lift")] = TAIL_LIFT
+    base[names.index("gust_lag")] = start.get("gust_lag", VANE_LAG)
     base[len(NAMES[flown.axis]):] = flown.start
     tied = {*fixed, *(n for n in NAMES[flown.axis] if "_" in n and OUTPUT_OF.get(n.split("_")[0]) in absent)}
     tied |= {f"bias_{o}" for o in absent} | {f"{o}_lag" for o in absent}

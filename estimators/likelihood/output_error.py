@@ -27,6 +27,7 @@ from estimators.regression import equation_error
 from estimators.regression.equations import EXCITED, NEEDED, SURFACES, movement
 from estimators.signals.coefficients import Airframe, airframe_of
 from estimators.signals.data_checks import check
+from estimators.signals.instruments import calibrated
 from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
@@ -58,7 +59,7 @@ def identify(
     """
     if structure not in MODELS:
         raise InputError(f"identify: structure '{structure}' is unknown; valid are: {', '.join(MODELS)}")
-    record = check(record)
+    record = calibrated(check(record))
     grid = common_grid(record)
     airframe, first = airframe_of(record, default), starting_values(record, start, default)
     result: dict[str, Estimate] = {}

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from icing_env.jit import kernel
+from icing_env.jit import entry, kernel
 
 ATTACK = 8.0  # how much faster than it falls an energy rises: a doublet is seen within a second (assumed)
 ELEVATOR, ROLLING, YAWING, GUST_ALPHA, GUST_BETA, ALPHA, BETA = range(7)
@@ -87,3 +87,15 @@ def hearing(
     turning = whole * gate(turn, low, high)
     lifting, pitching = whole * gate(lift, low, high), whole * gate(pitch, low, high)
     return whole, lifting, pitching, whole * gate(side, low, high), turning, turning
+
+
+@entry
+def heard(memory: Any, tuning: Any, airframe: Any, out: Any) -> None:
+    """How much each of the six channels took in of every sample of a run, into `out` (N, 6).
+
+    memory: N rows with the field `energy`; tuning, airframe: one row each.
+    """
+    for k in range(len(memory)):
+        whole = hearing(tuning[0], shares(memory[k], tuning[0], airframe[0]), 1.0)
+        for c in range(6):
+            out[k, c] = whole[c]

@@ -9,6 +9,7 @@ from estimators.airframe import airframe_from, published_airframe
 from estimators.observer.rows import GAS_CONSTANT
 from estimators.regression.equations import NEEDED
 from estimators.signals.coefficients import dynamic_pressure
+from estimators.signals.instruments import calibration, time_constant
 from estimators.signals.resample import Grid
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord
@@ -18,7 +19,7 @@ REFERENCE_TEMPERATURE = 288.15  # K: only the density, pressure over temperature
 
 
 def airframe_of_record(record: FlightRecord, airframe: NDArray[np.void] | None) -> NDArray[np.void]:
-    """One AIRFRAME row: `airframe` or the published one, mass, inertia and geometry as the record states."""
+    """One AIRFRAME row: `airframe` or the published one; mass, inertia, geometry and vanes as the record states."""
     aircraft = airframe_from(published_airframe() if airframe is None else airframe)[:1].copy()
     meta = record.meta
     if meta.mass is not None:
@@ -29,6 +30,10 @@ def airframe_of_record(record: FlightRecord, airframe: NDArray[np.void] | None) 
     if meta.geometry is not None:
         aircraft["wing_area"], aircraft["span"] = meta.geometry.wing_area, meta.geometry.span
         aircraft["chord"] = meta.geometry.chord
+    known = calibration(meta.sensors)
+    if known.stated:
+        aircraft["vane_lag"] = time_constant(known.lag("alpha"), record.dt)
+        aircraft["boom_gain"] = known.bending
     return aircraft
 
 

@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.estimate import Estimate
-from estimators.observer.layout import ACCELEROMETER, CHANNELS, COUNT, FIRST, PARAMETER_NAMES, SEEN_NAMES
+from estimators.observer.layout import CHANNELS, COUNT, FIRST, PARAMETER_NAMES, SEEN_NAMES
+from estimators.observer.learned import History, learned, noise_of
 from estimators.observer.measurements import absent, airframe_of_record, measurements
-from estimators.regression.equations import EXCITED, LARGEST_RATIO, SURFACES, movement
-from estimators.regression.least_squares import Fit, least_squares
+from estimators.regression.equations import DOWNWASH, EXCITED, LARGEST_RATIO, SURFACES, movement
 from estimators.signals.coefficients import thrust
 from estimators.signals.data_checks import check
 from estimators.signals.gust_level import turbulence_warnings
 from estimators.signals.resample import Grid, common_grid
-from icing_env.errors import InputError
-from icing_env.record import FlightRecord, FloatArray
+from icing_env.record import FlightRecord
 from icing_env.types import ESTIMATE, unit_of
 
+__all__ = ["FAR", "STARTS", "History", "Method", "histories", "identify"]
 AXIS = dict(zip(CHANNELS, ("longitudinal",) * 3 + ("lateral",) * 3, strict=True))
 EXTRAPOLATED = 0.2  # lift coefficient: nearest a record must come to zero lift for CD_0 to be its own (assumed)
 STARTS = (0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6)  # of the clean aircraft: seven, as in the paper's Figs. 23-26 (assumed)
@@ -43,23 +43,6 @@ class Method:
     default_tuning: Callable[[], NDArray[np.void]]
     kept: tuple[str, ...] = SEEN_NAMES
     own_errors: bool = False
-
-
-@dataclass(frozen=True)
-class History:
-    """What the observer believed at each instant: `time` (N,) s, `estimate` ESTIMATE (N,), `memory` (N,)."""
-
-    time: FloatArray
-    estimate: NDArray[np.void]
-    memory: NDArray[np.void]
-    tuning: NDArray[np.void]
-
-    def parameter(self, name: str) -> tuple[FloatArray, FloatArray]:
-        """Estimate of one parameter over time and the standard deviation that the method gives it, each (N,)."""
-        if name not in PARAMETER_NAMES:
-            raise InputError(f"recursive identifiers have no '{name}'; valid are: {', '.join(PARAMETER_NAMES)}")
-        index = PARAMETER_NAMES.index(name)
-        return self.memory["theta"][:, index], self.memory["deviation"][:, index]
 
 
 def histories(
@@ -124,12 +107,14 @@ def identify(
     The standard error is that of least squares on the rows that the observer learned from (behind its filter; the
     accelerometer's where there is one), corrected for coloured residuals: the scatter to be expected from what the
     record does not explain. It is not what the recursion holds for it, which rests on the tuning alone
-    (`History.parameter`). A record with gusts carries a warning. A parameter has converged if starts far apart end
+    (`History.parameter`). Of methods without errors of their own what noise in the regressors took is put back
+    (`learned`). A record with gusts carries a warning. A parameter has converged if starts far apart end
     close together, and is refused if not.
     """
     record = check(record)
     grid = common_grid(record)
     run, *far = (_to_the_last_good(h) for h in _run(method, grid, record, (start, *FAR), tuning, airframe))
+    aircraft, noise = airframe_of_record(record, airframe), noise_of(grid)
     lacks, warnings = absent(grid), turbulence_warnings(grid, method.name)
     moved = {
         name: movement(grid.time, grid.values[name], grid.good((name,)))
@@ -138,10 +123,13 @@ def identify(
     result: dict[str, Estimate] = {}
     for c, channel in enumerate(CHANNELS):
         if not lacks[AXIS[channel]] and (channel != "drag" or "ax" in grid.values):
-            fit = _fit(run, c)
+            fit, put_back = learned(run, c, aircraft, noise)
             for i in range(FIRST[c], FIRST[c] + COUNT[c]):
                 error = float(run.memory["deviation"][-1, i] if method.own_errors else fit.std_error[i - FIRST[c]])
                 value, name = float(run.memory["theta"][-1, i]), PARAMETER_NAMES[i]
+                if not method.own_errors:
+                    value += put_back[i - FIRST[c]]
+                    error = float(np.hypot(error, DOWNWASH.get(name, 0.0) * value))
                 why = _why_not(name, channel, moved) or _why_not_converged(run, far, i, len(grid.time))
                 if not why and not name.endswith("_0") and not error <= LARGEST_RATIO * abs(value):
                     why = f"its standard error {error:.2g} exceeds a third of the estimate {value:.2g}"
@@ -157,16 +145,6 @@ def _to_the_last_good(run: History) -> History:
     """Without what follows the last sample at which the observer was well: a failed one may hold anything."""
     end = int(np.flatnonzero(run.estimate["health"])[-1]) + 1 if run.estimate["health"].any() else 1
     return History(run.time[:end], run.estimate[:end], run.memory[:end], run.tuning)
-
-
-def _fit(run: History, c: int) -> Fit:
-    """Least squares on the rows of one channel, for residuals and their colour."""
-    part, memory = slice(FIRST[c], FIRST[c] + COUNT[c]), run.memory
-    good = (run.estimate["health"] == 1.0) & (memory["seated"] == 1.0)
-    a, rows = ACCELEROMETER[c], memory["filtered"][:, part]
-    felt = a >= 0 and np.isfinite(run.tuning["accelerometer"][0, a])
-    target = memory["felt_filtered"][:, a] if felt else memory["y"][:, c] - memory["zeta"][:, c]
-    return least_squares(np.where(good[:, None], rows, 0.0), np.where(good, target, 0.0))
 
 
 def _why_not_converged(run: History, far: Sequence[History], i: int, steps: int) -> str:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from estimators.estimate import Estimate
 from estimators.regression.equations import (
+    DOWNWASH,
     EQUATIONS,
     EXCITED,
     NEEDED,
@@ -24,11 +25,13 @@ from estimators.regression.equations import (
     fit_equation,
     movement,
 )
-from estimators.regression.preparation import prepare
+from estimators.regression.preparation import noise_of, prepare
 from estimators.regression.stepwise import PRACTICE, Criteria, Stepwise, choose, stepwise
+from estimators.regression.zero_lift import zero_lift_drag
 from estimators.signals.coefficients import Airframe, airframe_of, thrust
 from estimators.signals.data_checks import check
 from estimators.signals.gust_level import turbulence_warnings
+from estimators.signals.instruments import calibrated
 from estimators.signals.resample import Grid, common_grid
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
@@ -44,6 +47,7 @@ class Problem:
         moved: rms of each surface about its trend, rad.
         thrust_known: whether drag and axial force are free of it.
         warnings: by axis, where gusts bias what regression finds.
+        noise: variance of the noise in regressors by name.
     """
 
     data: Mapping[str, FloatArray]
@@ -51,6 +55,7 @@ class Problem:
     moved: Mapping[str, float]
     thrust_known: bool
     warnings: Mapping[str, str]
+    noise: Mapping[str, float]
 
     @property
     def equations(self) -> tuple[Equation, ...]:
@@ -59,11 +64,17 @@ class Problem:
 
     def finished(self, equation: Equation, found: dict[str, Estimate]) -> dict[str, Estimate]:
         """Estimates of an equation with the warning of its axis; refused where they contain thrust not recorded."""
-        found = {name: replace(e, warning=self.warnings.get(equation.axis, "")) for name, e in found.items()}
+        told = self.warnings.get(equation.axis, "")
+        found = {name: replace(e, warning=told, std_error=float(np.hypot(e.std_error, self._misfit(name) * e.estimate)))
+                 for name, e in found.items()}  # fmt: skip
         if self.thrust_known or equation.target not in ("CD", "CX"):
             return found
         why = "thrust was not recorded and cannot be told from drag"
         return {name: replace(e, identifiable=False, why=why) for name, e in found.items()}
+
+    def _misfit(self, name: str) -> float:
+        """Share of a derivative that the equation itself may be wrong by, where noise is allowed for as well."""
+        return DOWNWASH.get(name, 0.0) if self.noise else 0.0
 
     def flown(self, equation: Equation) -> bool:
         """Whether a surface of the equation's axis moved: without it products of noise and drift would compete."""
@@ -104,8 +115,11 @@ def identify(
             model = choose(*_candidates(equation, data, terms, rows))[0] if terms else ()
             entered = tuple(term for term in model if term in terms)
         found = fit_equation(
-            equation, data, rows, dict(problem.moved), f"equation error, {mode}", entered, mode == "textbook"
+            equation, data, rows, dict(problem.moved), f"equation error, {mode}", entered, mode == "textbook",
+            problem.noise,
         )
+        if equation.target == "CD" and problem.flown(equation):
+            found["CD_0"] = zero_lift_drag(data, rows, f"equation error, {mode}", mode == "textbook")
         result.update(problem.finished(equation, found))
     return result
 
@@ -143,20 +157,22 @@ def _candidates(
 
 def pose(record: FlightRecord, mode: str, default: Airframe | None = None, half: int | None = None) -> Problem:
     """The equations of a record; arguments and errors as for `identify`."""
-    record = check(record)
+    record = calibrated(check(record))
     grid = common_grid(record)
     axes = {axis: [n for n in needed if n not in grid.values] for axis, needed in NEEDED.items()}
     if all(axes.values()):
         lacks = "; ".join(f"{axis} needs {', '.join(names)}" for axis, names in axes.items())
         raise InputError(f"record '{record.meta.name}' lacks columns: {lacks}")
-    data, reach = prepare(grid, record, airframe_of(record, default), mode, half)
+    airframe = airframe_of(record, default)
+    data, reach = prepare(grid, record, airframe, mode, half)
     surfaces = [name for pair in SURFACES.values() for name in pair if name in grid.values]
     moved = {name: movement(grid.time, grid.values[name], grid.good((name,))) for name in surfaces}
     rows = {
         equation.target: _usable(grid, equation, reach) & np.isfinite(data[equation.target])
         for equation in EQUATIONS if not axes[equation.axis] and equation.target in data
     }  # fmt: skip
-    return Problem(data, rows, moved, thrust(grid.values) is not None, turbulence_warnings(grid, "regression"))
+    return Problem(data, rows, moved, thrust(grid.values) is not None, turbulence_warnings(grid, "regression"),
+                   noise_of(grid, airframe, mode, reach))  # fmt: skip
 
 
 def _usable(grid: Grid, equation: Equation, half: int) -> NDArray[np.bool_]:

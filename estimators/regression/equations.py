@@ -8,15 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimators.estimate import Estimate
 from estimators.regression.least_squares import Fit, correlation, least_squares
+from estimators.regression.noisy_regressors import compensated
 from icing_env.record import FloatArray
 
 EXCITED = np.radians(0.25)  # rms of a surface about its trend below which it has not moved (assumed)
+# Downwash reaches the tail tail_arm/V late; a moment by q stands for that to first order only. What the rest comes to
+# in doublets, as a share of each derivative: the mean error over calm simulated flights (development flights of
+# testbed.coverage).
+DOWNWASH = {"Cm_alpha": 0.008, "Cm_q": 0.014, "Cm_elevator": 0.018}
 LARGEST_CORRELATION = 0.9  # Klein & Morelli, section 5.5
 LARGEST_RATIO = 1.0 / 3.0  # standard error over estimate; beyond it the parameter is dropped
 
@@ -96,6 +102,7 @@ def fit_equation(
     method: str,
     entered: tuple[str, ...] = (),
     all_lags: bool = False,
+    noise: Mapping[str, float] = MappingProxyType({}),
 ) -> dict[str, Estimate]:
     """Fit one equation on the good rows and judge each of its derivatives.
 
@@ -107,16 +114,17 @@ def fit_equation(
         method: name that the estimates carry.
         entered: nonlinear terms in the model beside the equation's own.
         all_lags: correct errors for coloured residuals as the textbook does (`least_squares`).
+        noise: variance of the noise in regressors by name, where it is to be allowed for.
     """
     regressors = (*equation.regressors, *entered)
-    full = _fit(equation.target, regressors, data, good, all_lags)
+    full = _fit(equation.target, regressors, data, good, all_lags, noise)
     known = {name: data[name][good] for name in regressors}
     judged = judge_terms(equation, regressors, full, known, moved, method)
     unseen = [n for n in equation.optional if not judged[name_of(equation.target, n)].identifiable]
     if not unseen:
         return judged
     kept = tuple(name for name in regressors if name not in unseen)
-    fit = _fit(equation.target, kept, data, good, all_lags)
+    fit = _fit(equation.target, kept, data, good, all_lags, noise)
     result = judge_terms(equation, kept, fit, {name: known[name] for name in kept}, moved, method)
     return {**result, **{name: judged[name] for name in (name_of(equation.target, n) for n in unseen)}}
 
@@ -156,11 +164,14 @@ def judge_terms(
 
 
 def _fit(
-    target: str, names: tuple[str, ...], data: dict[str, FloatArray], good: NDArray[np.bool_], all_lags: bool
+    target: str, names: tuple[str, ...], data: dict[str, FloatArray], good: NDArray[np.bool_], all_lags: bool,
+    noise: Mapping[str, float],
 ) -> Fit:
     matrix = np.column_stack([*(data[name] for name in names), np.ones(len(good))])
     matrix[~good] = 0.0
-    return least_squares(matrix, np.where(good, data[target], 0.0), fade=not all_lags)
+    seen = np.where(good, data[target], 0.0)
+    fit = least_squares(matrix, seen, fade=not all_lags)
+    return compensated(fit, matrix, seen, np.array([*(noise.get(name, 0.0) for name in names), 0.0]))
 
 
 def _why_axis(equation: Equation, moved: Mapping[str, float]) -> str:

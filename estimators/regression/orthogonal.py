@@ -25,7 +25,9 @@ from estimators.regression.equations import (
     unit_of_term,
 )
 from estimators.regression.least_squares import Fit, correlation, least_squares
+from estimators.regression.noisy_regressors import compensated
 from estimators.regression.stepwise import predicted_square_error
+from estimators.regression.zero_lift import zero_lift_drag
 from estimators.signals.coefficients import Airframe
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
@@ -200,8 +202,13 @@ def _repeats(function: FloatArray, linear: Mapping[str, FloatArray]) -> bool:
 def _estimates(equation: Equation, problem: Problem, bound: str) -> dict[str, Estimate]:
     model, functions = _model(equation, problem, bound)
     terms = model.terms[:-1]
-    fit = replace(model.fit, theta=model.theta)
+    used = np.column_stack([*(functions[n] for n in terms), np.ones(len(functions[equation.regressors[0]]))])
+    noise = np.array([*(problem.noise.get(n, 0.0) for n in terms), 0.0])
+    target = problem.data[equation.target][problem.rows[equation.target]]
+    fit = compensated(replace(model.fit, theta=model.theta), used, target, noise)
     found = judge_terms(equation, terms, fit, {n: functions[n] for n in terms}, dict(problem.moved), METHOD)
+    if equation.target == "CD" and problem.flown(equation):
+        found["CD_0"] = zero_lift_drag(problem.data, problem.rows["CD"], METHOD)
     for name in equation.regressors:
         if name not in terms:
             why = "its term does not lower the predicted square error"

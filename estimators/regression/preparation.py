@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.signal import savgol_filter
 
+from estimators.regression.noisy_regressors import white_noise
 from estimators.signals.coefficients import (
     Airframe,
     body_forces,
@@ -52,6 +53,28 @@ def prepare(
     reach = half_width(grid.dt) if half is None else half
     value, rate = _filters(grid, mode, reach)
     return _filtered(grid, airframe, value, rate), reach
+
+
+def noise_of(grid: Grid, airframe: Airframe, mode: str, half: int) -> dict[str, float]:
+    """Variance of the noise left in each regressor by name, behind the filter of a mode that matches; else nothing.
+
+    half: samples either side in the slope filter.
+    """
+    if mode not in ("matched", "fourier"):
+        return {}
+    value, _ = _filters(grid, mode, half)
+    impulse = np.zeros(len(grid.time))
+    impulse[len(impulse) // 2] = 1.0
+    left = float(np.nansum(value(impulse) ** 2))
+    airspeed, size = float(np.mean(grid.values["airspeed"])), airframe.geometry
+    hat = {"p": size.span, "q": size.chord, "r": size.span}
+    found = {}
+    for name in ("alpha", "beta", "elevator", "aileron", "rudder", *hat):
+        if name in grid.values:
+            scale = hat[name] / (2.0 * airspeed) if name in hat else 1.0
+            regressor = f"{name}_hat" if name in hat else name
+            found[regressor] = white_noise(grid.values[name][grid.good((name,))]) * left * scale**2
+    return found
 
 
 def _filters(grid: Grid, mode: str, half: int) -> tuple[Filter, Filter]:

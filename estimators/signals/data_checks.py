@@ -13,6 +13,7 @@ import numpy as np
 
 from estimators.regression.equations import EXCITED, SURFACES, movement
 from estimators.signals.force_checks import check_lift_slope, without_doubtful_thrust
+from estimators.signals.instruments import calibrated
 from estimators.signals.kinematic_checks import check_kinematics
 from estimators.signals.magnitudes import check_magnitudes
 from estimators.signals.mending import FEWEST, mended
@@ -42,7 +43,7 @@ def check(record: FlightRecord) -> FlightRecord:
     where = f"record '{record.meta.name}'"
     check_magnitudes(record)
     record = mended(record)
-    grid = common_grid(record)
+    grid = common_grid(calibrated(record))  # signs and units are judged without the lags that are known
     confirmed = check_kinematics(grid, where)
     if check_lift_slope(where, grid, record) or record.has("ground_speed"):
         confirmed.add("airspeed")

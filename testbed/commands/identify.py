@@ -75,6 +75,7 @@ def identify(path: Path, name: str, mode: str = "matched", start: float = 1.0, c
     """
     from estimators.compatibility.record import check_compatibility
     from estimators.signals.data_checks import check
+    from estimators.signals.instruments import calibrated
     from icing_env.errors import InputError
     from icing_env.record import read
     from testbed.identify_report import Identified
@@ -91,7 +92,7 @@ def identify(path: Path, name: str, mode: str = "matched", start: float = 1.0, c
     if compatible != "none":
         calibration = check_compatibility(record, wind=compatible == "wind")
         record = calibration.record
-    return Identified(path, record, method(name)(record, **options), calibration)
+    return Identified(path, calibrated(record), method(name)(record, **options), calibration)
 
 
 def _start(name: str, start: float) -> float:
