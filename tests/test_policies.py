@@ -8,7 +8,7 @@ import pickle
 import numpy as np
 import pytest
 
-from controllers.policies.files import Network, read, shapes, write
+from controllers.policies.files import Network, find, read, shapes, shipped, write
 from controllers.policies.policy import Policy
 from icing_env import scenario as scenarios
 from icing_env.actions import names
@@ -173,3 +173,12 @@ def test_the_network_in_the_metadata_is_plain_json(tmp_path):
     head = (tmp_path/"p.safetensors").read_bytes()
     length = int.from_bytes(head[:8], "little")
     assert json.loads(json.loads(head[8:8 + length])["__metadata__"]["network"])["mode"] == "targets"
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_a_shipped_policy_says_how_it_was_made(name):
+    net, _, card = read(find(name))
+    assert name == f"{card['algorithm']}_{card['name']}_{card['seed']}"
+    assert card["command"].startswith(f"icing train {card['algorithm']} --config {card['name']}")
+    assert card["curve"][-1]["steps"] == card["steps_learned"] >= card["steps_flown"]
+    assert card["configuration"]["env_kwargs"]["mode"] == net.mode
