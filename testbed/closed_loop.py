@@ -69,9 +69,9 @@ class ClosedLoop:
         """Who tells the ice management the ice surface by surface, if anybody does."""
         if sense not in SENSES:
             raise InputError(f"no way to sense ice '{sense}': {nearest(sense, list(SENSES))}")
-        about = (self.estimate, self.advisory, self.management_tuning)
+        about = (self.estimate, self.advisory)
         if knows:
-            return Oracle(self.clean, self.dt, *about)
+            return Oracle(self.clean, self.dt, *about, self.management_tuning)
         if sense == "characterise" and (self.managing or self.adapting):
             return Characteriser(n, self.clean, self.dt, *about, reference)
         return None

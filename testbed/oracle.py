@@ -20,6 +20,7 @@ from icing_env.types import DERIVATIVE_NAMES, ESTIMATED_NAMES, SENSED_PARTS
 
 FloatArray = NDArray[np.float64]
 PERIOD = 0.5  # s between looks: ice changes in minutes, an inflation is seen half a second late
+KNOWS = 2.0  # in `told`: severity and confidence are told as well
 DOUBT = 1e-3  # standard error told, relative to the clean value: next to none
 FAILED = ("boot_failed_left_wing", "boot_failed_right_wing", "boot_failed_htail", "prop_heat_failed")  # of SENSED_PARTS
 
@@ -104,8 +105,11 @@ class Oracle:
         eta = np.stack([state[f"eta_{part}"] for part in SENSED_PARTS], axis=1)
         failed = np.stack([np.broadcast_to(p[name], len(state)) for name in FAILED], axis=1)
         told = self.advisory[rows]
-        detected = (eta.max(axis=1) > self.tuning["detect_severity"][0]*self.tuning["eta_severe"][0])
-        tell(told, eta, np.zeros_like(eta), np.ones(len(state)), detected, failed > 0.5, self.tuning)
+        g = self.tuning[0]
+        worst = np.maximum(eta.max(axis=1)/g["eta_severe"], said["excess_drag"]/g["drag_severe"])
+        tell(told, eta, np.zeros(len(state)), worst > g["detect_severity"], failed > 0.5)
+        told["severity"] = np.clip(said["excess_drag"]/g["drag_severe"], 0.0, 1.0)
+        told["confidence"], told["told"] = 1.0, KNOWS
         self.estimate[rows], self.advisory[rows] = said, told
 
 

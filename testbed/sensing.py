@@ -27,13 +27,12 @@ class Characteriser:
         clean: PARAMETERS row of the clean aircraft.
         dt: step [s].
         estimate, advisory: ESTIMATE rows that it reads and ADVISORY rows that it writes.
-        tuning: IMS_TUNING row.
         reference: features of each aircraft's own clean flight [n or 1, features]; the type's numbers if omitted.
     """
 
-    def __init__(self, n: int, clean: NDArray, dt: float, estimate: NDArray, advisory: NDArray, tuning: NDArray,
+    def __init__(self, n: int, clean: NDArray, dt: float, estimate: NDArray, advisory: NDArray,
                  reference: NDArray[np.float64] | None = None) -> None:
-        self.dt, self.estimate, self.advisory, self.tuning = dt, estimate, advisory, tuning
+        self.dt, self.estimate, self.advisory = dt, estimate, advisory
         self.clean, self.character, self.reference = clean_from(clean), online.load(RIVAL), reference
         self.kept, self.severity = online.init(n)
         self.known = estimate.copy()  # of the last judgement, lift and pitch from the evidence where that is good
@@ -80,7 +79,7 @@ class Characteriser:
                            for part in PARTS], axis=1)
         std = np.stack([seen[f"eta_{part}_std"] for part in PARTS], axis=1)
         failed[:, :2] |= unlike(eta[:, :2], std[:, :2], seen["tested_left_wing"])
-        tell(told, eta, std, seen["p_iced"], seen["ice_detected"] > 0.5, failed, self.tuning)
+        tell(told, eta, seen["p_iced"], seen["ice_detected"] > 0.5, failed)
         self.advisory[rows] = told
 
 

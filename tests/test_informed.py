@@ -31,7 +31,7 @@ def test_the_oracle_says_what_is_true():
     for part in SENSED_PARTS:
         assert a[f"severity_{part}"] == pytest.approx(f.state[f"eta_{part}"], abs=1e-3)
     assert e["Cl_aileron"] == pytest.approx(f.current["Cl_aileron"]) and (a["ice_detected"] == 1).all()
-    assert (e["Cm_elevator"] > -1.6).all() and (e["excess_drag"] > 0.02).all() and (a["confidence"] == 1).all()
+    assert (e["Cm_elevator"] > -1.6).all() and (e["excess_drag"] > 0.02).all() and (a["confidence"] > 0.9).all()
     clear = flown("oracle", eta={}).loop
     assert (clear.advisory["ice_detected"] == 0).all() and clear.estimate["excess_drag"] == pytest.approx(0, abs=1e-9)
 

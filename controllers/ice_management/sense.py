@@ -3,8 +3,8 @@
 * severity: inverse-variance mean of the severities that excess drag and, where elevator inputs have excited them, the
   losses of CL_alpha, Cm_alpha and Cm_elevator speak for. Drag comes first because its scatter is the smallest part of
   its icing effect (founding paper: excess drag follows icing above 80 %); the fleet scatter in each variance says so.
-* instead, where somebody else has told the ice surface by surface (`tell`): severity is that of the worst of wings and
-  tailplane, by the probability that the ice matters
+* where somebody else tells the ice surface by surface (`tell`), detection is theirs; the severity, of the aircraft as a
+  whole, stays that of drag and derivatives
 * detection: confirmed after a time above a threshold, released after a time below a lower one (hysteresis), by one
   counter that runs up and down
 """
@@ -53,7 +53,7 @@ def assess(e: Any, frame: Any, g: Any) -> tuple[float, float]:
 @kernel
 def characterise(a: Any, e: Any, frame: Any, g: Any, dt: float) -> None:
     """Severity, confidence and detection. An unhealthy or undefined estimate changes the confidence only."""
-    if a.told == 1.0:
+    if a.told == 2.0:  # by one who knows
         a.since_detection = (a.since_detection + dt)*a.ice_detected
         return
     severity, confidence = assess(e, frame, g)
@@ -63,6 +63,9 @@ def characterise(a: Any, e: Any, frame: Any, g: Any, dt: float) -> None:
         return
     a.severity += (severity - a.severity)*(1.0 - math.exp(-dt/g.severity_time))
     a.confidence = confidence
+    if a.told == 1.0:
+        a.since_detection = (a.since_detection + dt)*a.ice_detected
+        return
     if a.severity > g.detect_severity and confidence >= g.confidence_min:
         a.memory = min(a.memory + dt/g.detect_time, 1.0)
     elif a.severity < g.clear_severity:
@@ -74,26 +77,21 @@ def characterise(a: Any, e: Any, frame: Any, g: Any, dt: float) -> None:
     a.since_detection = (a.since_detection + dt)*a.ice_detected
 
 
-def tell(advisory: NDArray[Any], eta: NDArray[np.float64], std: NDArray[np.float64], sure: NDArray[np.float64],
-         detected: NDArray[np.bool_], failed: NDArray[np.bool_], tuning: NDArray[Any]) -> None:
-    """Take the ice surface by surface from somebody else, in place; from then on drag alone decides nothing.
+def tell(advisory: NDArray[Any], eta: NDArray[np.float64], sure: NDArray[np.float64], detected: NDArray[np.bool_],
+         failed: NDArray[np.bool_]) -> None:
+    """Take the ice surface by surface from somebody else, in place; from then on drag alone detects nothing.
 
     Ice that the drag had shown before stays detected for as long as it is more likely than not.
 
     Args:
         advisory: ADVISORY rows [n].
-        eta, std: severity of each of SENSED_PARTS and its standard error [n, 4].
+        eta: severity of each of SENSED_PARTS [n, 4].
         sure: probability that the ice matters [n].
         detected: ice is believed [n].
         failed: protection of each part is believed to have failed [n, 4].
-        tuning: one IMS_TUNING row.
     """
     advisory["told"] = 1.0
     for i, part in enumerate(SENSED_PARTS):
         advisory[f"severity_{part}"] = np.maximum(eta[:, i], 0.0)
         advisory[f"failed_{part}"] = failed[:, i]
-    worst, rows = eta[:, :3].argmax(axis=1), np.arange(len(eta))
-    severe = tuning["eta_severe"][0]
-    advisory["severity"] = np.clip(sure*eta[rows, worst]/severe, 0.0, 1.0)
-    advisory["confidence"] = 1.0/(1.0 + (std[rows, worst]/(severe*tuning["confidence_half"][0]))**2)
     advisory["ice_detected"] = detected | ((advisory["ice_detected"] > 0.5) & (sure > 0.5))
