@@ -243,17 +243,20 @@ def test_switches_are_fields_of_the_command():
 
 @pytest.mark.slow
 def test_a_training_goes_on_where_it_was_killed(tmp_path):
+    from safetensors.numpy import load_file
+
     from testbed.characterisation.train import Options, train
 
     options, said = Options(aircraft=20, parts=1, hours=0.7, iterations=20), []
     train(tmp_path, options, said.append)
-    first = (tmp_path / "network.safetensors").read_bytes()
+    first = load_file(tmp_path / "network.safetensors")
     assert sum("flying" in line for line in said) == 2
     (tmp_path / "network.safetensors").unlink()
     said.clear()
     train(tmp_path, options, said.append)
     assert not any("flying" in line for line in said)
-    assert (tmp_path / "network.safetensors").read_bytes() == first
+    again = load_file(tmp_path / "network.safetensors")  # bytes may differ: the header's order is not kept
+    assert again.keys() == first.keys() and all(again[k].tobytes() == first[k].tobytes() for k in first)
     assert characterise.__name__ and online.load("network", tmp_path)
 
 

@@ -7,7 +7,7 @@ import pytest
 from answers import answer, apart
 from controlled import airframe, cruise, free, requested, scattered, targets
 
-from controllers.ice_management.clean_answer import quasi_pitch
+from controllers.ice_management.clean_answer import quasi_inertia, quasi_pitch
 from controllers.kernels import air_density
 from controllers.laws import autopilot, indi, l1, scheduled
 from icing_env.types import ESTIMATE, ESTIMATED_NAMES, TARGET
@@ -21,7 +21,8 @@ def identified(n: int = 1, error: float = 0.05, density: float = 1.0, **shares) 
     """A healthy, excited estimate of the clean aircraft, or of one that keeps only shares of its derivatives."""
     e = np.zeros(n, ESTIMATE)
     cm_alpha, cm_q = quasi_pitch(CLEAN[0], density)
-    clean = {"Cm_alpha": cm_alpha, "Cm_q": cm_q, "CL_alpha": float(CLEAN["CX_0"][0] - CLEAN["CZ_alpha"][0])}
+    cm_elevator = float(CLEAN["Cm_elevator"][0])/quasi_inertia(CLEAN[0], density)
+    clean = {"Cm_alpha": cm_alpha, "Cm_q": cm_q, "Cm_elevator": cm_elevator, "CL_alpha": float(CLEAN["CX_0"][0] - CLEAN["CZ_alpha"][0])}
     for name in ESTIMATED_NAMES:
         value = clean.get(name, float(CLEAN[name][0]) if name in CLEAN.dtype.names else 0.0)
         e[name], e[f"{name}_std"] = value*shares.get(name, 1.0), error*abs(value)

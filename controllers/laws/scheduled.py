@@ -24,7 +24,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.ice_management.clean_answer import change_aileron_rudder, change_elevator, quasi_pitch
+from controllers.ice_management.clean_answer import (
+    change_aileron_rudder,
+    change_elevator,
+    quasi_inertia,
+    quasi_pitch,
+)
 from controllers.kernels import air_density, clip
 from controllers.laws.augment import TRUST_FIELDS, followed, load_augmented, trusted
 from controllers.laws.autopilot import AUTOPILOT_FIELDS, damp_yaw, engage, hold_bank, hold_pitch
@@ -68,10 +73,11 @@ def schedule_pitch(a: Any, e: Any, m: Any, f: Any, g: Any, dt: float) -> bool:
     cl_alpha = f.CX_0 - f.CZ_alpha
     a.CL_alpha = followed(a.CL_alpha, e.CL_alpha, cl_alpha, trusted(e.CL_alpha_std, cl_alpha, x, h, g), g, dt)
     by_alpha, by_q = trusted(e.Cm_alpha_std, cm_alpha, x, h, g), trusted(e.Cm_q_std, cm_q, x, h, g)
-    power = trusted(e.Cm_elevator_std, f.Cm_elevator, x, h, g)
+    cm_elevator = f.Cm_elevator/quasi_inertia(f, air_density(m))
+    power = trusted(e.Cm_elevator_std, cm_elevator, x, h, g)
     a.Cm_alpha = followed(a.Cm_alpha, e.Cm_alpha, cm_alpha, by_alpha, g, dt)
     a.Cm_q = followed(a.Cm_q, e.Cm_q, cm_q, by_q, g, dt)
-    a.Cm_elevator = followed(a.Cm_elevator, e.Cm_elevator, f.Cm_elevator, power, g, dt)
+    a.Cm_elevator = followed(a.Cm_elevator, e.Cm_elevator, cm_elevator, power, g, dt)
     return by_alpha and power
 
 
