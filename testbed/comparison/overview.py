@@ -47,15 +47,17 @@ def sentences(rows: Rows) -> list[tuple[str, str]]:
 
 
 def _protection(seen: list[dict[str, Any]]) -> list[tuple[str, str]]:
+    """Stalls and losses of all controllers with and without protection; who does worse than 1 % with it."""
     out = []
-    for one in seen:
-        bare = [o for o in seen if o["controller"] == one["controller"] and not o["protection"]]
-        if not one["protection"] or not bare:
+    for metric, what in zip(SAFETY, ("stalled for more than 1 s", "lost"), strict=True):
+        shares = {on: {one["controller"]: 100.0*one["metrics"][metric][0] for one in seen if one["protection"] == on}
+                  for on in (True, False)}
+        if not shares[True] or not shares[False]:
             continue
-        with_, without = ({m: o["metrics"][m][0] for m in SAFETY} for o in (one, bare[0]))
-        good = all(with_[m] <= 0.01 for m in SAFETY)
-        text = ", ".join(f"{m} {100*with_[m]:.1f} % (unprotected {100*without[m]:.1f} %)" for m in SAFETY)
-        out.append((f"{one['controller']}, protected: {text}.", "good" if good else "caution"))
+        spans = {on: f"{min(told.values()):.1f} to {max(told.values()):.1f} %" for on, told in shares.items()}
+        worse = ", ".join(name for name, value in shares[True].items() if value > 1.0)
+        text = f"Episodes {what}, over all controllers: {spans[True]} protected, {spans[False]} unprotected"
+        out.append((f"{text}{f'; above 1 % protected: {worse}' if worse else ''}.", "caution" if worse else "good"))
     return out
 
 
