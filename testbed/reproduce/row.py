@@ -45,7 +45,7 @@ class Rule:
     def holds(self, paper: float, project: float) -> bool:
         """True if they agree; never for a number that is not finite."""
         short = paper - project if self.at_least else abs(project - paper)
-        return math.isfinite(project) and short <= self.absolute + self.relative*abs(paper) + 1e-12
+        return bool(math.isfinite(project) and short <= self.absolute + self.relative*abs(paper) + 1e-12)
 
     def text(self, unit: str) -> str:
         """The rule in words."""
