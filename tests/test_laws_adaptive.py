@@ -22,7 +22,8 @@ def identified(n: int = 1, error: float = 0.05, density: float = 1.0, **shares) 
     e = np.zeros(n, ESTIMATE)
     cm_alpha, cm_q = quasi_pitch(CLEAN[0], density)
     cm_elevator = float(CLEAN["Cm_elevator"][0])/quasi_inertia(CLEAN[0], density)
-    clean = {"Cm_alpha": cm_alpha, "Cm_q": cm_q, "Cm_elevator": cm_elevator, "CL_alpha": float(CLEAN["CX_0"][0] - CLEAN["CZ_alpha"][0])}
+    cl_alpha = float(CLEAN["CX_0"][0] - CLEAN["CZ_alpha"][0])
+    clean = {"Cm_alpha": cm_alpha, "Cm_q": cm_q, "Cm_elevator": cm_elevator, "CL_alpha": cl_alpha}
     for name in ESTIMATED_NAMES:
         value = clean.get(name, float(CLEAN[name][0]) if name in CLEAN.dtype.names else 0.0)
         e[name], e[f"{name}_std"] = value*shares.get(name, 1.0), error*abs(value)
