@@ -175,9 +175,9 @@ def test_inversion_uses_the_surface_power_that_is_believed():
     for share in (1.0, 0.75):
         a, c = indi.init(1), requested(1, 0)
         for _ in range(400):
-            steer(indi, a, c, m, identified(Cm_elevator=share), gains)
+            steer(indi, a, c, m, identified(density=air_density(m[0]), Cm_elevator=share), gains)
         m["theta"] += 0.01
-        steer(indi, a, c, m, identified(Cm_elevator=share), gains)
+        steer(indi, a, c, m, identified(density=air_density(m[0]), Cm_elevator=share), gains)
         m["theta"] -= 0.01
         asked.append(float(c["elevator"][0]) - 0.01)
     assert asked[1] == pytest.approx(asked[0]/0.75, rel=1e-6)

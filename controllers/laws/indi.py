@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.kernels import clip
+from controllers.ice_management.clean_answer import quasi_inertia
+from controllers.kernels import air_density, clip
 from controllers.laws.augment import TRUST_FIELDS, followed, pitch_power, roll_power, trusted
 from controllers.laws.autopilot import damp_yaw
 from controllers.laws.guidance import (
@@ -104,11 +105,12 @@ def sense(a: Any, m: Any, g: Any, dt: float) -> None:
 
 
 @kernel
-def believe(a: Any, e: Any, f: Any, g: Any, dt: float) -> None:
+def believe(a: Any, e: Any, m: Any, f: Any, g: Any, dt: float) -> None:
     """Shares of elevator and aileron power, from the estimate where it is trusted."""
-    pitch = trusted(e.Cm_elevator_std, f.Cm_elevator, e.excitation_longitudinal, e.health, g)
+    cm_elevator = f.Cm_elevator/quasi_inertia(f, air_density(m))  # as identifiers find it on the clean aircraft
+    pitch = trusted(e.Cm_elevator_std, cm_elevator, e.excitation_longitudinal, e.health, g)
     roll = trusted(e.Cl_aileron_std, f.Cl_aileron, e.excitation_lateral, e.health, g)
-    a.Cm_elevator = followed(a.Cm_elevator, e.Cm_elevator, f.Cm_elevator, pitch, g, dt)
+    a.Cm_elevator = followed(a.Cm_elevator, e.Cm_elevator, cm_elevator, pitch, g, dt)
     a.Cl_aileron = followed(a.Cl_aileron, e.Cl_aileron, f.Cl_aileron, roll, g, dt)
 
 
@@ -146,7 +148,7 @@ def step(memory: NDArray[Any], command: NDArray[Any], measurement: NDArray[Any],
         if a.engaged == 0.0:
             engage(a, m, t, g)
         sense(a, m, g, dt)
-        believe(a, estimate[i], f, g, dt)
+        believe(a, estimate[i], m, f, g, dt)
         scale = surface_scale(m, g)
         theta = guide(a, c, m, t, adv, g, scale, dt)
         command_bank(a, m, t, adv, g, dt)
