@@ -1,13 +1,16 @@
-"""One metric of every controller in every case, as dots with intervals."""
+"""Figures of a comparison: a metric of every controller in every case, and how the learned ones learned."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from controllers.policies.files import find, read
 from testbed.comparison.overview import Rows
+from testbed.flight import controller
 from testbed.plot_style import GREY, ROLES, legend_above, styled
 
 COLUMNS = 4
@@ -49,4 +52,28 @@ def by_case(rows: Rows, name: str) -> Figure:
     unit = rows[0]["metrics"][name]["unit"]
     figure.supxlabel(name.replace("_", " ") + ("" if unit == "1" else f" ({unit})"), fontsize=9.5)
     legend_above(figure, panels[:len(cases)])
+    return figure
+
+
+@styled
+def learning_curves(controllers: Sequence[str]) -> Figure:
+    """Mean reward on the fixed evaluation cases against decisions learned from, a line per training seed.
+
+    Args:
+        controllers: learned ones, by their names in `testbed.flight.CONTROLLERS`.
+    """
+    columns = min(COLUMNS, len(controllers))
+    lines = math.ceil(len(controllers)/columns)
+    figure = Figure(figsize=(11.0, 0.4 + 2.2*lines), layout="constrained")
+    panels = list(figure.subplots(lines, columns, squeeze=False).flat)
+    for axes, name in zip(panels, controllers, strict=False):
+        for member in controller(name).members:
+            curve = read(find(member))[2]["curve"]
+            axes.plot([point["steps"]/1e3 for point in curve], [point["reward"] for point in curve], linewidth=1.0,
+                      label=f"seed {member[-1]}")
+        axes.set_title(name, fontsize=8.5)
+        axes.set(xlabel="decisions (thousands)", ylabel="mean reward")
+    for axes in panels[len(controllers):]:
+        axes.set_visible(False)
+    legend_above(figure, panels[:len(controllers)])
     return figure

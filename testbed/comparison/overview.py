@@ -63,8 +63,9 @@ def _protection(seen: list[dict[str, Any]]) -> list[tuple[str, str]]:
 
 def _nuisance(rows: Rows) -> list[tuple[str, str]]:
     clear = [row for row in rows if row["protection"] and row["scenario"] in ("clear_air", "steps_clean")]
-    told = {row["controller"]: max(row["metrics"]["nuisance_time"]["mean"] or 0.0,
-                                   0.0) for row in clear}  # fmt: skip
+    told: dict[str, float] = {}
+    for row in clear:
+        told[row["controller"]] = max(told.get(row["controller"], 0.0), row["metrics"]["nuisance_time"]["mean"] or 0.0)
     if not told:
         return []
     worst = max(told, key=lambda name: told[name])

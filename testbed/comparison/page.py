@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from testbed.comparison.figures import by_case
+from testbed.comparison.figures import by_case, learning_curves
 from testbed.comparison.overview import FUNCTIONS, Rows, names_of, overview, sentences
 from testbed.files import write_whole
 from testbed.report import Cell, Report
@@ -32,6 +32,12 @@ def write(result: Mapping[str, Any], provenance: Mapping[str, str], folder: Path
         report.verdict(text, kind)
     for function, title in FUNCTIONS.items():
         _function(report, rows, function, title)
+    learned = list(dict.fromkeys(row["controller"] for row in rows if row["kind"] == "learned"))
+    if learned:
+        report.section("How the learned controllers learned")
+        report.figure(learning_curves(learned), "Mean reward on the fixed evaluation cases, a line per training seed; "
+                      "the policy that flies is the best point of its curve.",
+                      "learning curves of every learned controller")
     write_whole(folder/"compare.json", json.dumps(result, allow_nan=False, indent=1))
     return report.write(folder/"compare.html")
 
