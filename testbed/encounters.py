@@ -29,6 +29,7 @@ from icing_env.scenario import Scenario
 from icing_env.types import SURFACES
 from icing_env.world import World
 from testbed.closed_loop import ClosedLoop
+from testbed.comparison.flight_figures import BANK, LIMIT_LOAD, LIMIT_NEGATIVE_LOAD, TOUCHED
 
 FloatArray = NDArray[np.float64]
 DURATION = 120.0  # s
@@ -38,9 +39,7 @@ SHARES = (0.7, 1.3)  # severity of a surface over the common one; assumed
 # Excess drag per eta of each surface: UIUC AllIce 6.527 x 0.0488, split as in configs/ice/dhc6.toml.
 DRAG = {"left_wing": 0.0382, "right_wing": 0.0382, "htail": 0.0096, "vtail": 0.0127, "struts": 0.051, "other": 0.1688}
 SEEDS = {"development": 41_000_000, "report": 73_000_000}  # first seed; each scenario has a million of its own
-ONSET_TIME, BANK = 1.0, np.radians(60.0)  # s, rad
-LIMIT_LOAD, LIMIT_NEGATIVE_LOAD = 3.8, -1.52  # 1, FlightGear dhc6-base.xml
-TOUCHED = 1e-6  # rad or 0..1, change to a control that counts
+ONSET_TIME = 1.0  # s
 LOOK = 5  # steps between looks: 10 Hz
 
 # The founding flight's first encounter without its minutes of clear air before it, doublets early in the episode, the

@@ -17,7 +17,7 @@ from icing_env.tasks import ALTITUDE_STEP, HEADING_STEP, STEP_TIMES
 from testbed.comparison.ice_figures import present
 from testbed.comparison.trace import INTERVAL, Trace, rms
 
-TOUCHED = 1e-6  # rad, change to a surface that counts as an intervention
+TOUCHED = 1e-6  # rad or 0..1, change to a control that counts as an intervention
 LIMIT_LOAD, LIMIT_NEGATIVE_LOAD = 3.8, -1.52  # 1, FlightGear dhc6-base.xml
 BANK = math.radians(60.0)  # rad, an aerobatic bank by 14 CFR 91.307
 BAND = 0.1  # share of the step within which it counts as settled
