@@ -12,26 +12,47 @@ import numpy as np
 
 from icing_env.dynamics import loads, meet_air, meet_air_near, rates
 from icing_env.frames import direction_cosines
-from icing_env.integrate import AHEAD, RECORDS, SLOPE, STAGES, START, TOTAL, TRIAL, WEIGHT, move, normalise, put
+from icing_env.integrate import (
+    AFTER,
+    AHEAD,
+    AT,
+    BEFORE,
+    GUST_RECORDS,
+    GUSTS,
+    MET,
+    RECORDS,
+    SLOPE,
+    STAGES,
+    START,
+    TOTAL,
+    TRIAL,
+    WEIGHT,
+    meet_gusts,
+    move,
+    normalise,
+    put,
+)
 from icing_env.jit import block as apart
 from icing_env.jit import kernel
 from icing_env.lanes import LANES, lane
 from icing_env.parameters import PARAMETERS
-from icing_env.types import COMMAND, CONTINUOUS, CURRENT, GUST_FIELDS, N_CONTINUOUS, structured
+from icing_env.types import COMMAND, CONTINUOUS, CURRENT, N_CONTINUOUS
 
-GUSTS = structured(GUST_FIELDS[:7])
 AIR = np.dtype([(name, "f8") for name in (  # what `meet_air` returns
     "density", "static", "airspeed", "alpha", "beta", "sine", "cosine", "ua", "va", "wa", "slowness")])
 LOADS = np.dtype([(name, "f8") for name in (  # what `loads` returns
     "fx", "fy", "fz", "roll", "pitch", "yaw", "airspeed", "alpha", "beta", "density", "thrust_left", "thrust_right",
     "hinge_elevator", "hinge_aileron", "static")])
-# Rows of a block: the records of `integrate`, the air met, the loads felt, and what is held over the step.
+# Rows of a block: the records of `integrate`, the air met, the loads felt, the gusts, and what is held over the step.
 NOW, RATES = TRIAL*N_CONTINUOUS, SLOPE*N_CONTINUOUS
 AT_AIR = RECORDS*N_CONTINUOUS
 AT_LOADS = AT_AIR + len(AIR.names or ())
 FAILS = AT_LOADS + len(LOADS.names or ())  # not 0: `meet_air_near` does not hold
-AT_GUSTS = FAILS + 1
-AT_CURRENT = AT_GUSTS + len(GUSTS.names or ())
+N_GUSTS = len(GUSTS.names or ())
+FIRST_GUSTS = FAILS + 1
+GUSTS_BEFORE, GUSTS_AFTER = FIRST_GUSTS + BEFORE*N_GUSTS, FIRST_GUSTS + AFTER*N_GUSTS
+AT_GUSTS = FIRST_GUSTS + MET*N_GUSTS
+AT_CURRENT = FIRST_GUSTS + GUST_RECORDS*N_GUSTS
 AT_COMMAND = AT_CURRENT + len(CURRENT.names or ())
 AT_PARAMETERS = AT_COMMAND + len(COMMAND.names or ())
 ROWS = AT_PARAMETERS + len(PARAMETERS.names or ())
@@ -42,13 +63,6 @@ def fill(block: Any, row: int, j: int, numbers: Any) -> None:
     """Put the numbers of aircraft `j` into a block from a row on."""
     for n in range(len(numbers)):
         block[(row + n)*LANES + j] = numbers[n]
-
-
-@kernel
-def copy_gusts(out: Any, s: Any) -> None:
-    """The gusts of a STATE record."""
-    out.gust_u, out.gust_v, out.gust_w, out.gust_w_tail = s.gust_u, s.gust_v, s.gust_w, s.gust_w_tail
-    out.gust_p, out.gust_q, out.gust_r = s.gust_p, s.gust_q, s.gust_r
 
 
 @kernel
@@ -120,12 +134,13 @@ def feel_block(block: Any, count: int) -> None:
 
 
 @kernel
-def rk4_block(block: Any, count: int, dt: float) -> None:
-    """Advance the first `count` aircraft of a block by `dt`; the continuous state is in the record TRIAL."""
+def rk4_block(block: Any, count: int, dt: float, sub: int, substeps: int) -> None:
+    """Advance the first `count` aircraft of a block by `dt` (see `rk4`); their states are in the record TRIAL."""
     size = N_CONTINUOUS*LANES
     put(block, START, TRIAL, size)
     put(block, TOTAL, TRIAL, size)
     for k in range(STAGES):
+        meet_gusts(block[FIRST_GUSTS*LANES:], (sub + AT[k])/substeps, N_GUSTS*LANES)
         meet_air_block(block, count)
         for j in range(count):
             x = lane(block, NOW, j, CONTINUOUS)

@@ -3,7 +3,7 @@
 Flat Earth, rigid body, 3-2-1 quaternion attitude. Stevens, Lewis & Johnson, Aircraft Control and Simulation, 3rd ed.,
 eqs. 1.7-18 (translation, rotation with Ixz, kinematics); all in body axes about the c.g.
 
-Records: `x` the continuous state, `s` the state with what is held over a step (gusts), `c` the coefficients as they
+Records: `x` the continuous state, `s` the gusts now (of the state, or on the way to it), `c` the coefficients as they
 are now (ice included), `p` the parameters, `u` the command.
 """
 

@@ -1,7 +1,7 @@
 """The classical fourth-order Runge-Kutta step of the continuous state (Press et al., Numerical Recipes, section 17.1).
 
-Gusts, ice and commands are held. This is the step of one aircraft in its records; `icing_env.blocks` has that of
-several side by side.
+Ice and commands are held; gusts go in straight lines from the beginning of the environment step to its end. This is
+the step of one aircraft in its records; `icing_env.blocks` has that of several side by side.
 """
 
 from __future__ import annotations
@@ -12,12 +12,17 @@ from typing import Any
 from icing_env.dynamics import meet_air, rates
 from icing_env.frames import direction_cosines
 from icing_env.jit import kernel
+from icing_env.types import GUST_FIELDS, structured
 
 STAGES = 4
 START, TRIAL, SLOPE, TOTAL = 0, 1, 2, 3  # the records of one aircraft
 RECORDS = 4
 AHEAD = (0.5, 0.5, 1.0, 0.0)  # where the next slope is taken, in steps
 WEIGHT = (1.0/6.0, 1.0/3.0, 1.0/3.0, 1.0/6.0)
+AT = (0.0, 0.5, 0.5, 1.0)  # where the slopes are taken, in steps
+GUSTS = structured(GUST_FIELDS[:7])
+BEFORE, AFTER, MET = 0, 1, 2  # the records of one aircraft's gusts: at both ends of the environment step, and now
+GUST_RECORDS = 3
 
 
 @kernel
@@ -65,6 +70,21 @@ def copy(out: Any, x: Any) -> None:
 
 
 @kernel
+def copy_gusts(out: Any, s: Any) -> None:
+    """The gusts of a STATE record."""
+    out.gust_u, out.gust_v, out.gust_w, out.gust_w_tail = s.gust_u, s.gust_v, s.gust_w, s.gust_w_tail
+    out.gust_p, out.gust_q, out.gust_r = s.gust_p, s.gust_q, s.gust_r
+
+
+@kernel
+def meet_gusts(gusts: Any, share: float, size: int) -> None:
+    """Gusts now, `share` of the way through the environment step; `size` as for `put`."""
+    for n in range(size):
+        before = gusts[n + BEFORE*size]
+        gusts[n + MET*size] = before + share*(gusts[n + AFTER*size] - before)
+
+
+@kernel
 def normalise(x: Any) -> None:
     """Bring the quaternion back to unit length."""
     scale = 1.0/math.sqrt(x.e0*x.e0 + x.e1*x.e1 + x.e2*x.e2 + x.e3*x.e3)
@@ -75,15 +95,21 @@ def normalise(x: Any) -> None:
 
 
 @kernel
-def rk4(stage: Any, numbers: Any, s: Any, c: Any, p: Any, u: Any, dt: float) -> None:
-    """Advance one aircraft by `dt`: its continuous state goes in and comes out in the record TRIAL of `stage`."""
+def rk4(stage: Any, numbers: Any, gusts: Any, airs: Any, c: Any, p: Any, u: Any, dt: float, sub: int,
+        substeps: int) -> None:
+    """Advance one aircraft by `dt`, substep `sub` of an environment step.
+
+    Its continuous state goes in and comes out in the record TRIAL of `stage`; `gusts` has its GUST_RECORDS. `numbers`
+    and `airs` are the memory of both as plain numbers.
+    """
     size = len(numbers)//RECORDS
-    x = stage[TRIAL]
+    x, met = stage[TRIAL], gusts[MET]
     put(numbers, START, TRIAL, size)
     put(numbers, TOTAL, TRIAL, size)
     for k in range(STAGES):
+        meet_gusts(airs, (sub + AT[k])/substeps, len(airs)//GUST_RECORDS)
         attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
-        rates(x, stage[SLOPE], attitude, meet_air(x, attitude, s, c, p), s, c, p, u)
+        rates(x, stage[SLOPE], attitude, meet_air(x, attitude, met, c, p), met, c, p, u)
         move(numbers, AHEAD[k]*dt, WEIGHT[k]*dt, size)
     put(numbers, TRIAL, TOTAL, size)
     normalise(x)

@@ -1,8 +1,8 @@
 """The only loop over aircraft: one environment step of every row, and the arrays it works on.
 
-Order of one step (docs/model.md): once a second cloud and accretion; ice protection; coefficients with ice; gusts,
-then held; Runge-Kutta substeps with commands held; instruments. A row sees nothing of other rows, so one aircraft
-flies bit for bit the same alone and in a batch, on one thread or several.
+Order of one step (docs/model.md): once a second cloud and accretion; ice protection; coefficients with ice; gusts at
+the end of the step; Runge-Kutta substeps with commands held and gusts in straight lines; instruments. A row sees
+nothing of other rows, so one aircraft flies bit for bit the same alone and in a batch, on one thread or several.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from icing_env.blocks import (
     AT_CURRENT,
     AT_GUSTS,
     AT_PARAMETERS,
-    GUSTS,
+    GUSTS_AFTER,
+    GUSTS_BEFORE,
     NOW,
     ROWS,
-    copy_gusts,
     feel_block,
     fill,
     recall_loads,
@@ -35,7 +35,7 @@ from icing_env.cloud import advance_cloud
 from icing_env.dynamics import air_data, forces, present_aircraft
 from icing_env.frames import direction_cosines
 from icing_env.ice_protection import advance_protection
-from icing_env.integrate import RECORDS, TRIAL, copy, rk4
+from icing_env.integrate import AFTER, BEFORE, GUST_RECORDS, GUSTS, RECORDS, TRIAL, copy, copy_gusts, rk4
 from icing_env.jit import entry, kernel
 from icing_env.lanes import LANES, lane
 from icing_env.memory import call_at, matrix, rows
@@ -60,7 +60,7 @@ def advance_weather_and_ice(s: Any, p: Any, airspeed: float, dt: float) -> None:
 
 @kernel
 def prepare(s: Any, c: Any, p: Any, u: Any, o: Any, dt: float, one_hertz: int) -> None:
-    """What is held over the step: weather and ice (once a second), ice protection, coefficients, gusts."""
+    """Weather and ice (once a second), ice protection, coefficients, all held over the step; gusts at its end."""
     if s.step % one_hertz == 0:
         advance_weather_and_ice(s, p, o.airspeed, dt*one_hertz)
         hold_filter_constants(s, p, dt)
@@ -91,14 +91,17 @@ def advance(table: Any) -> None:
     """One environment step of every row, one after another; there is a PARAMETERS row per aircraft or one for all."""
     state, measurement, current, parameters, command, outcome, clocks = arrays_of(table)
     stage, numbers = rows(table, 7, CONTINUOUS), rows(table, 8, NUMBER)
+    gusts, airs = rows(table, 9, GUSTS), rows(table, 10, NUMBER)
     clock, shared = clocks[0], len(parameters) == 1
     dt, step = clock.dt, clock.dt/clock.substeps
     for i in range(len(state)):
         s, c, p, u, x = state[i], current[i], parameters[0 if shared else i], command[i], stage[TRIAL]
+        copy_gusts(gusts[BEFORE], s)
         prepare(s, c, p, u, outcome[i], dt, clock.one_hertz)
+        copy_gusts(gusts[AFTER], s)
         copy(x, s)
-        for _ in range(clock.substeps):
-            rk4(stage, numbers, s, c, p, u, step)
+        for k in range(clock.substeps):
+            rk4(stage, numbers, gusts, airs, c, p, u, step, k, clock.substeps)
         copy(s, x)
         felt = forces(x, direction_cosines(x.e0, x.e1, x.e2, x.e3), s, c, p)
         finish(felt, s, measurement[i], c, p, u, outcome[i], dt, clock.ten_hertz, clock.one_hertz)
@@ -118,16 +121,19 @@ def advance_blocks(table: Any) -> None:
         count = min(LANES, len(state) - first)
         for j in range(count):
             i = first + j
+            copy_gusts(lane(block, GUSTS_BEFORE, j, GUSTS), state[i])
             prepare(state[i], current[i], parameters[0 if shared else i], command[i], outcome[i], dt,
                     clock.one_hertz)
             copy(lane(block, NOW, j, CONTINUOUS), state[i])
-            copy_gusts(lane(block, AT_GUSTS, j, GUSTS), state[i])
+            copy_gusts(lane(block, GUSTS_AFTER, j, GUSTS), state[i])
             fill(block, AT_CURRENT, j, currents[i])
             fill(block, AT_COMMAND, j, commands[i])
             if not shared:
                 fill(block, AT_PARAMETERS, j, settings[i])
-        for _ in range(clock.substeps):
-            rk4_block(block, count, step)
+        for k in range(clock.substeps):
+            rk4_block(block, count, step, k, clock.substeps)
+        for j in range(count):
+            copy_gusts(lane(block, AT_GUSTS, j, GUSTS), state[first + j])
         feel_block(block, count)
         for j in range(count):
             i = first + j
@@ -197,8 +203,8 @@ class Fleet:
                   self.clock)
         if len(arrays[0]) >= LANES:
             return call_at(advance_blocks, *arrays, np.zeros(ROWS*LANES))
-        stage = np.zeros(RECORDS, CONTINUOUS)
-        return call_at(advance, *arrays, stage, stage.view(np.float64))
+        stage, gusts = np.zeros(RECORDS, CONTINUOUS), np.zeros(GUST_RECORDS, GUSTS)
+        return call_at(advance, *arrays, stage, stage.view(np.float64), gusts, gusts.view(np.float64))
 
     def start(self, rows: slice | NDArray = slice(None)) -> None:
         """Settle gusts, coefficients and instruments of the given rows on their continuous state."""

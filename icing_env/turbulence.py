@@ -1,4 +1,4 @@
-"""Turbulence and discrete gusts: the velocity of the air that the aircraft meets, in body axes, held over a step.
+"""Turbulence and discrete gusts: the velocity of the air that the aircraft meets, in body axes.
 
 Signs: gust_u, gust_v, gust_w are the velocity of the AIR along the body axes, gust_p, gust_q, gust_r the rotation of
 the air, so that the velocity relative to the air is inertial velocity - wind - gust, and likewise for the rates.
@@ -121,9 +121,9 @@ def discrete_gust(time: float, airspeed: float, p: Any) -> float:
 
 @kernel
 def add_discrete(s: Any, p: Any, airspeed: float, dt: float) -> None:
-    """Add the discrete gust to gust_u, gust_v, gust_w."""
+    """Add the discrete gust at the end of the step to gust_u, gust_v, gust_w."""
     if p.gust_amplitude_u != 0.0 or p.gust_amplitude_v != 0.0 or p.gust_amplitude_w != 0.0:
-        shape = discrete_gust(float(s.step) * dt, airspeed, p)
+        shape = discrete_gust(float(s.step + 1) * dt, airspeed, p)
         s.gust_u += shape * p.gust_amplitude_u
         s.gust_v += shape * p.gust_amplitude_v
         s.gust_w += shape * p.gust_amplitude_w
@@ -195,7 +195,7 @@ def advance_rotation(s: Any, p: Any, airspeed: float, dt: float, v_before: float
 
 @kernel
 def advance_turbulence(s: Any, p: Any, airspeed: float, dt: float) -> None:
-    """Draw the gusts of the step that begins now.
+    """Draw the gusts at the end of the step that begins now; within it they go there in straight lines.
 
     Args:
         s: STATE record; step counts intervals of dt. Reads seed, step, altitude; writes dryden_* and gust_*.

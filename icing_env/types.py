@@ -41,7 +41,7 @@ CONTINUOUS_FIELDS: list[Field] = [
 ]
 
 GUST_FIELDS: list[Field] = [
-    ("gust_u", "m/s", "turbulence and discrete gust, air velocity along body x, held over a step"),
+    ("gust_u", "m/s", "turbulence and discrete gust, air velocity along body x, now"),
     ("gust_v", "m/s", "the same along body y"),
     ("gust_w", "m/s", "the same along body z"),
     ("gust_p", "rad/s", "rotation of the air about body x"),

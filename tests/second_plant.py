@@ -2,7 +2,7 @@
 
 Plain NumPy, nothing of ours imported, so that a slip in the compiled plant cannot repeat itself. Sections are those of
 docs/model.md. Functions take floats or arrays of one shape; records are namespaces with the documents' names: `x`
-continuous states, `s` held gusts and ice, `c` the aircraft now, `p` parameters, `u` command. SI and radians.
+continuous states, `s` gusts and ice, `c` the aircraft now, `p` parameters, `u` command. SI and radians.
 """
 
 from __future__ import annotations
@@ -284,11 +284,12 @@ def rates(x: Record, s: Record, c: Record, p: Record, u: Record) -> list[Any]:
 # ---- section 14, with an integrator of its own
 
 
-def hold(y: NDArray, seconds: float, s: Record, c: Record, p: Record, u: Record) -> NDArray:
-    """States (20 floats) after an interval over which everything else is held."""
+def fly(y: NDArray, seconds: float, before: Record, after: Record, c: Record, p: Record, u: Record) -> NDArray:
+    """States (20 floats) after an interval with gusts on their way from `before` to `after`; the rest is held."""
 
-    def slope(_: float, now: NDArray) -> list[Any]:
-        return rates(Record(**dict(zip(STATES, now.tolist(), strict=True))), s, c, p, u)
+    def slope(t: float, now: NDArray) -> list[Any]:
+        gusts = {k: v + t/seconds*(getattr(after, k) - v) for k, v in vars(before).items() if k.startswith("gust_")}
+        return rates(Record(**dict(zip(STATES, now.tolist(), strict=True))), Record(**gusts), c, p, u)
 
     scale = 1e-11 * np.array([1e3, 1e3, 1e3, 50, 50, 50, *[1] * 4, *[0.1] * 3, *[0.1] * 4, 1e5, 1e5, 0.1])
     solution = solve_ivp(slope, (0, seconds), y, "DOP853", rtol=1e-11, atol=scale, first_step=seconds)

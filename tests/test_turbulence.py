@@ -157,7 +157,7 @@ def test_low_altitude_scales_join_the_high_ones() -> None:
 def test_discrete_gust_has_its_shape() -> None:
     values = {"gust_start_time": 1.0, "gust_length": 36.0, "gust_amplitude_w": 5.0, "gust_amplitude_v": -2.0}
     gusts = history(150, 0.02, turbulence_sigma_w=0.0, turbulence_tail_delay=1.0, **values)
-    time = np.arange(150) * 0.02
+    time = np.arange(1, 151) * 0.02  # the end of each step
     path = V * (time - 1.0)
     shape = np.where((path > 0) & (path < 72.0), 0.5 * (1 - np.cos(math.pi * path / 36.0)), 0.0)
     assert np.allclose(gusts["gust_w"], 5.0 * shape)

@@ -29,7 +29,7 @@ class Point:
     gradient: FloatArray
     information: FloatArray
     noise: FloatArray
-    detail: tuple[FloatArray, FloatArray]
+    detail: tuple[FloatArray, ...]
 
 
 class Problem(Protocol):
