@@ -83,6 +83,8 @@ class ClosedLoop:
         self._estimate = bound(self._step, self.observer, estimate, measurement, self.airframe, self.tuning, dt)
         self._manage = bound(ice_management.step, advisory, estimate, measurement, self.clean, self.management_tuning,
                              dt)
+        self._judge_power = bound(ice_management.judge_power, advisory, measurement, self.target, self.clean,
+                                  self.management_tuning, dt)
         self._steer: Callable[[], None] | None = None  # compiled when first wanted: surfaces alone need no autopilot
         self._command = command
         self._operate = bound(ice_management.operate, command, advisory)
@@ -121,6 +123,7 @@ class ClosedLoop:
             self.informant.observe()
         if self.managing:
             self._manage()
+            self._judge_power()
 
     def steer(self) -> None:
         """Fly the targets."""

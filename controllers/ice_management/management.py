@@ -1,7 +1,8 @@
 """The ice management system: its functions in their order, over rows of aircraft.
 
 It sees measurements and estimates only. The four functions of Bragg et al. (AIAA-2000-0360): `sense` and characterise
-the ice, `operate` the ice protection, `limits` of the envelope, adapt the control laws; and tell the crew.
+the ice, `operate` the ice protection, `limits` of the envelope, adapt the control laws; and tell the crew, for which
+`power` is judged apart because it looks at what is asked for.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ from numpy.typing import NDArray
 
 from controllers.ice_management.limits import limit_envelope
 from controllers.ice_management.operate import operate_protection
-from controllers.ice_management.power import sense_power
 from controllers.ice_management.sense import characterise
 from controllers.ice_management.upsets import limit_flap, sense_upsets
 from icing_env.jit import entry
@@ -56,7 +56,6 @@ def step(
         g = tuning[i if len(tuning) > 1 else 0]
         characterise(a, e, frame, g, dt)
         operate_protection(a, m, g, dt)
-        sense_power(a, m, frame, g, dt)
         sense_upsets(a, m, frame, g, dt)
         limit_envelope(a, m, e, frame, g, dt)
         limit_flap(a, m, e, frame, g)
