@@ -114,13 +114,28 @@ def test_advisory_limits_what_is_asked_for():
     t["phi"], t["flap"], m["airspeed"] = 0.5, 0.65, 75.0
     for _ in range(200):
         steer(autopilot, a, c, m, t, advisory, gains, DT)
-    assert a["bank_command"] == pytest.approx(0.1)
+    assert a["bank_command"] == pytest.approx(0.1 - gains["bank_margin"][0])
     assert c["flap"] == 0.35
     assert c["throttle_left"] > 0.6  # towards the limit, not the target
     assert c["elevator"] > 0.05  # the climb yields to the airspeed
     advisory = free()
     advisory["alpha_limit"] = -0.02
     assert one_step(cruise(), advisory, pitch_mode=0, theta=0.2)[0]["elevator"] > 0.01
+    advisory = free()
+    advisory["pitch_limit"] = 0.02
+    assert one_step(cruise(), advisory, pitch_mode=0, theta=0.2)[0]["elevator"] > 0.01
+
+
+def test_near_the_speed_limit_the_descent_is_the_one_that_full_power_sustains():
+    advisory = free(2)
+    advisory["airspeed_limit"], advisory["climb_spare"] = 60.0, (-0.05, 0.05)
+    a, c, m, t = autopilot.init(2), np.zeros(2, COMMAND), cruise(2), np.zeros(2, TARGET)
+    gains = autopilot.default_gains()
+    m["airspeed"] = 60.0 + gains["airspeed_margin"][0]
+    t["pitch_mode"], t["altitude"], t["speed_mode"], t["airspeed"] = 1, 2200.0, 1, 60.0
+    for _ in range(200):
+        steer(autopilot, a, c, m, t, advisory, gains, DT)
+    assert a["climb_command"] == pytest.approx([-0.05*m["airspeed"][0], 0.0], abs=0.15)
 
 
 @settings(max_examples=50, deadline=None)

@@ -8,6 +8,7 @@ from controlled import airframe, believed, cruise
 
 from controllers import ice_management
 from icing_env import scenario
+from icing_env.types import TARGET
 from testbed.flight import make_world
 from testbed.ice_protection_study import fly
 
@@ -113,3 +114,29 @@ def test_power_is_lacking_where_level_flight_takes_nearly_all(lever, climbing, l
     for _ in range(120):
         ice_management.judge_power(a, m, np.zeros(1, TARGET), airframe(), TUNING, DT)
     assert a["power_lacking"][0] == lacking
+
+
+def test_power_is_judged_at_the_speed_asked_for():
+    m, asked = cruise(3), np.zeros(3, TARGET)  # level and steady at 65 m/s, asked for 65, 72, and for no speed
+    m["airspeed"], m["throttle_left"], m["throttle_right"] = 65.0, 0.83, 0.83
+    m["thrust_left"] = m["thrust_right"] = 3300.0
+    m["ax"] = 9.80665*np.sin(m["theta"])
+    asked["speed_mode"], asked["airspeed"] = (1, 1, 0), (65.0, 72.0, 72.0)
+    a = ice_management.init(3)
+    for _ in range(120):
+        ice_management.judge_power(a, m, asked, airframe(), TUNING, DT)
+    assert a["power_share"] == pytest.approx([0.83, a["power_share"][1], 0.83], abs=0.001)
+    assert a["power_lacking"].tolist() == [0, 1, 0]
+    # parasite drag grows with V^2, that of lift falls with it, and a propeller's thrust falls with V
+    assert 0.83*(72.0/65.0)**1.0 < a["power_share"][1] < 0.83*(72.0/65.0)**3.0
+
+
+def test_power_that_lacks_at_the_start_is_told_within_seconds():
+    m, a = cruise(), ice_management.init(1)
+    m["throttle_left"] = m["throttle_right"] = 1.0
+    m["thrust_left"] = m["thrust_right"] = 3900.0
+    m["ax"] = 9.80665*np.sin(m["theta"])
+    for _ in range(400):
+        m["time"] += 0.02
+        ice_management.judge_power(a, m, np.zeros(1, TARGET), airframe(), TUNING, 0.02)
+    assert a["power_lacking"][0] == 1

@@ -11,8 +11,9 @@ have GUIDANCE_GAINS_FIELDS; its inner loop, from pitch and bank asked for to the
 * bank_command = atan(V K_psi (heading error)/g), slewed
 * throttle = trim + K_V (airspeed error) + K_climb (climb-rate command)
 
-The advisory limits what is asked for: bank, lowest airspeed (raises the airspeed target, and the climb yields to the
-airspeed), angle of attack (lowers the pitch command), flap.
+The advisory limits what is asked for, with a margin so that the protection has nothing to do: bank, pitch, angle of
+attack (lowers the pitch command), flap, lowest airspeed (raises the airspeed target, and the climb yields to the
+airspeed: where full power does not sustain level flight, by the descent that it does sustain).
 """
 
 from __future__ import annotations
@@ -62,6 +63,8 @@ GUIDANCE_GAINS_FIELDS: list[Field] = [
     ("theta_max", "rad", "highest pitch asked for"),
     ("alpha_margin", "rad", "distance kept from the advised alpha limit"),
     ("airspeed_margin", "m/s", "distance kept from the advised airspeed limit"),
+    ("bank_margin", "rad", "distance kept from the advised bank limit"),
+    ("pitch_margin", "rad", "distance kept from the advised pitch limit"),
     ("bank_max", "rad", "largest bank asked for"),
     ("bank_rate", "rad/s", "slew rate of the bank command"),
     ("elevator_min", "rad", "elevator limit, trailing edge up"),
@@ -124,12 +127,18 @@ def navigate(a: Any, m: Any, g: Any, dt: float) -> None:
 
 
 @kernel
+def sustained(a: Any, adv: Any) -> float:
+    """Climb rate [m/s] at which full power keeps the airspeed, where that is a descent; else 0."""
+    return a.airspeed*min(adv.climb_spare, 0.0)
+
+
+@kernel
 def climb_command(a: Any, t: Any, adv: Any, g: Any, dt: float) -> float:
     """Climb rate asked for [m/s], slewed; it yields where the airspeed nears its limit."""
     wanted = t.climb_rate
     if t.pitch_mode == 1.0:
         wanted = g.K_altitude*(t.altitude - a.altitude)
-    spare = g.K_speed_priority*(a.airspeed - adv.airspeed_limit - g.airspeed_margin)
+    spare = g.K_speed_priority*(a.airspeed - adv.airspeed_limit - g.airspeed_margin) + sustained(a, adv)
     slew = g.climb_slew*dt
     a.climb_command += clip(clip(min(wanted, spare), -g.climb_max, g.climb_max) - a.climb_command, -slew, slew)
     return a.climb_command
@@ -144,7 +153,7 @@ def turn_alpha(m: Any, g: Any, scale: float) -> float:
 @kernel
 def pitch_command(a: Any, m: Any, t: Any, adv: Any, g: Any, climb: float, scale: float, dt: float) -> float:
     """Pitch angle asked for [rad], limited by the advised angle of attack."""
-    low, high = g.theta_min, g.theta_max
+    low, high = g.theta_min, min(g.theta_max, adv.pitch_limit - g.pitch_margin)
     ceiling = clip(m.theta + adv.alpha_limit - g.alpha_margin - m.alpha, low, high)
     if t.pitch_mode == 0.0:
         a.pitch_trim = m.theta
@@ -172,7 +181,7 @@ def hold_airspeed(a: Any, c: Any, m: Any, t: Any, adv: Any, g: Any, climb: float
 @kernel
 def slew_bank(a: Any, wanted: float, adv: Any, g: Any, dt: float) -> bool:
     """Move the bank asked for towards `wanted` [rad], within the limits; True once it is there."""
-    limit = max(min(g.bank_max, adv.bank_limit), 0.0)
+    limit = max(min(g.bank_max, adv.bank_limit - g.bank_margin), 0.0)
     left = clip(wanted, -limit, limit) - a.bank_command
     slew = g.bank_rate*dt
     a.bank_command += clip(left, -slew, slew)

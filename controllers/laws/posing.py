@@ -60,7 +60,7 @@ def sound(m: Any, t: Any, adv: Any) -> bool:
     seen = m.airspeed + m.alpha + m.beta + m.p + m.q + m.r + m.phi + m.theta + m.psi + m.ax + m.ay + m.az
     held = m.elevator + m.aileron + m.rudder + m.flap + m.altitude + m.pressure + m.temperature
     asked = t.theta + t.altitude + t.climb_rate + t.throttle + t.airspeed + t.phi + t.heading + t.flap
-    limits = adv.alpha_limit + adv.bank_limit + adv.airspeed_limit + adv.flap_limit
+    limits = adv.alpha_limit + adv.bank_limit + adv.airspeed_limit + adv.flap_limit + adv.pitch_limit + adv.climb_spare
     return math.isfinite(seen + held + asked + limits)
 
 
