@@ -83,7 +83,7 @@ def test_angle_of_attack_stays_below_the_advised_one():
 
 def test_bank_stays_below_the_advised_one_and_answers_are_as_quick_without():
     kept = answer("mpc", "bank", limits={"bank_limit": 0.2})["phi"].max()
-    assert 0.19 < kept < 0.21
+    assert 0.95*(0.2 - mpc.default_gains()["bank_margin"][0]) < kept < 0.2  # what is asked for keeps a margin
 
 
 def test_ice_is_made_good_by_what_the_model_lacks():
