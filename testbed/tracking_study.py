@@ -3,8 +3,8 @@
 The steps of `steps_iced` against those of `steps_clean`, protected, in light turbulence: the same seeds, so the same
 gusts, second by second. Time is split by the truth: the share of full power that steady flight of the iced aircraft at
 the airspeed and altitude asked for takes, in level flight and, apart, with the bank and the climb that are flown (means
-over the last CLIMB_TIME). Nobody but the score sees that share. An error on ice is compared with the clean one over the
-same seeds and the same seconds; intervals by bootstrap over the seeds.
+over the last CLIMB_TIME; a descent counts as level). Nobody but the score sees that share. An error on ice is compared
+with the clean one over the same seeds and the same seconds; intervals by bootstrap over the seeds.
 """
 
 from __future__ import annotations
@@ -95,7 +95,8 @@ def track(name: str, who: str, seeds: list[int]) -> Tracked:
         bank.append(f.measurement["phi"].copy())
         if step % LOOK == 0:
             past = height[-back - 1:]
-            climb = (past[-1] - past[0])/((len(past) - 1)*SAMPLE*world.dt)/target["airspeed"]
+            rate = (past[-1] - past[0])/((len(past) - 1)*SAMPLE*world.dt)
+            climb = np.maximum(rate, 0.0)/target["airspeed"]  # who sinks for want of power has no power to spare
             level, flown = required(world), required(world, climb, np.mean(bank[-back:], axis=0))
         for what, value in {**{error: world.task[f"{error}_error"] for error in ERRORS}, "level": level, "flown": flown,
                             "told": said["power_lacking"] > 0.5, "full": f.command["throttle_left"] > LEVER,

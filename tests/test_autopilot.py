@@ -96,6 +96,18 @@ def test_integrators_do_not_wind_up():
     assert c["throttle_left"] < 1.0
 
 
+def test_gusts_at_the_stop_of_the_levers_do_not_take_the_power_off():
+    a, c, m, t = autopilot.init(1), np.zeros(1, COMMAND), cruise(), np.zeros(1, TARGET)
+    t["speed_mode"], t["airspeed"], t["theta"] = 1, 72.0, 0.02
+    m["throttle_left"] = m["throttle_right"] = 0.9
+    gains, trim = autopilot.default_gains(), []
+    for k in range(6000):
+        m["airspeed"] = 72.0 + (2.0 if k//250 % 2 else -2.0)
+        steer(autopilot, a, c, m, t, free(), gains, DT)
+        trim.append(float(a["throttle_trim"][0]))
+    assert np.mean(trim[-500:]) == pytest.approx(0.9, abs=0.06)  # without more than the gusts' own 0.04 of drift
+
+
 def test_a_protection_that_acts_stops_the_pulling_integrator():
     m = cruise()
     m["theta"] = -0.05
