@@ -1,4 +1,7 @@
-"""`icing benchmark`: how fast (`speed`), how well ice is told (`characterisation`), what protection is worth."""
+"""`icing benchmark`: how fast (`speed`), how well ice (`characterisation`) and gaps (`diagnosis`) are told.
+
+`protection`, `adaptation`: what they are worth.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +13,11 @@ import click
 from icing_env.errors import InputError, nearest
 from testbed.commands.common import print_json, print_table, verb
 
-NAMES = ("speed", "characterisation", "protection", "adaptation")
+NAMES = ("speed", "characterisation", "protection", "adaptation", "diagnosis")
 EXAMPLE = """icing benchmark speed --json
 icing benchmark characterisation --quick --figure out/reliability.png
-icing benchmark protection --encounters 200 --json"""
+icing benchmark protection --encounters 200 --json
+icing benchmark diagnosis --quick --out out/withheld"""
 
 
 @verb("benchmark", EXAMPLE)
@@ -23,8 +27,16 @@ icing benchmark protection --encounters 200 --json"""
 @click.option("--figure", type=click.Path(path_type=Path), help="characterisation: reliability curves as PNG.")
 @click.option("--encounters", type=click.IntRange(min=2), help="protection: encounters per row; 1000 if omitted.")
 @click.option("--only", metavar="A,B,...", help="protection: rows of these only, such as unprotected,surfaces.")
+@click.option("--cases", type=click.IntRange(min=8), help="diagnosis: how many; 2400 if omitted, 150 with --quick.")
+@click.option("--fresh-seed", is_flag=True, help="diagnosis: a sealed set, its seed from the operating system.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/withheld"),
+              show_default=True, help="diagnosis: records, keys, answers; an interrupted run goes on from there.")
+@click.option("--ledger", type=click.Path(path_type=Path, dir_okay=False),
+              help="diagnosis: append a line on this run to that file.")
+@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="diagnosis: processes.")
 def command(name: str, quick: bool, weights: Path | None, figure: Path | None, encounters: int | None,
-            only: str | None, as_json: bool, seed: int) -> None:
+            only: str | None, cases: int | None, fresh_seed: bool, out: Path, ledger: Path | None, workers: int,
+            as_json: bool, seed: int) -> None:
     """Measure the testbed.
 
     `speed`: one aircraft and batches, with and without observer, one thread, beside JSBSim in the same run (if it is
@@ -32,8 +44,9 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
     flights that no fit has seen. `protection`: shares of drawn encounters with ice and turbulence in which the
     autopilot stalls or departs, unprotected, with every protection and with the true ice known; nuisance in clear air;
     the time that a protection takes. `adaptation`: flying qualities of iced aircraft with the control laws adapted,
-    against the clean aircraft's. Seeds are fixed in the code, apart from those of the training; --seed changes
-    nothing.
+    against the clean aircraft's. `diagnosis`: gaps drawn and flown by a plant of the benchmark's own, half of them in
+    another form than the library's, some in no library; the solver does not see the keys. Seeds are fixed in the code,
+    apart from those of the training; --seed changes nothing but the set of `diagnosis`.
     """
     if name == "speed":
         _speed(as_json)
@@ -43,6 +56,9 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
         return
     if name == "adaptation":
         _adaptation(quick, as_json)
+        return
+    if name == "diagnosis":
+        _diagnosis(quick, cases, None if fresh_seed else seed, out, ledger, workers, as_json)
         return
     from testbed.characterisation.benchmark import draw, measure, tables
 
@@ -60,6 +76,20 @@ def _adaptation(quick: bool, as_json: bool) -> None:
     from testbed.adaptation_study import measure, tables
 
     found = measure(quick, lambda what: click.echo(f"{what} ...", err=True))
+    if as_json:
+        print_json(found)
+        return
+    for title, headers, rows in tables(found):
+        print_table(title, headers, rows)
+
+
+def _diagnosis(quick: bool, cases: int | None, seed: int | None, out: Path, ledger: Path | None, workers: int,
+               as_json: bool) -> None:
+    from testbed.diagnosis_benchmark import FULL, QUICK, enter_ledger, measure, tables
+
+    found = measure(out, cases or (QUICK if quick else FULL), seed, workers, lambda what: click.echo(what, err=True))
+    if ledger is not None:
+        enter_ledger(ledger, found, out)
     if as_json:
         print_json(found)
         return

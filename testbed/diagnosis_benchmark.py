@@ -1,0 +1,147 @@
+"""Run the diagnosis over a sealed set of cases, without its keys, and score the answers.
+
+Worker processes get the paths of records and nothing else; the key folder is closed to reading meanwhile. Every
+answer is written as soon as it is there, so that an interrupted run goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from icing_env.errors import InputError
+from testbed.withheld.draw import DEVELOPMENT_SEED
+from testbed.withheld.files import read_json, tampered, write_text
+from testbed.withheld.generate import generate
+from testbed.withheld.manoeuvres import DIAGNOSED
+from testbed.withheld.score import score
+
+QUICK, FULL = 150, 2400
+LEDGER_COLUMNS = ("date", "set", "cases", "sources", "manifest", "top1", "top3", "null_false_alarm", "pair_exact_set",
+                  "unknown_auroc_above_8", "where_f1", "ece", "coverage95", "closure_median")  # fmt: skip
+Progress = Callable[[str], None]
+
+
+def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Progress) -> dict[str, Any]:
+    """Draw (or finish drawing) a set in `out`, diagnose every case, score.
+
+    Args:
+        out: folder of records, keys, manifest and answers; what it holds already is kept.
+        cases: how many.
+        seed: added to the development seed; None lets the operating system choose (a sealed set).
+        workers: processes, for flights and diagnoses.
+        progress: told what is being done.
+
+    Raises:
+        InputError: `out` holds another set, or its files are not those of its manifest.
+    """
+    committed = _drawn(out, cases, seed, workers, progress)
+    _solve(out, sorted(committed["cases"]), workers, progress)
+    progress("scoring")
+    found = score(out / "answers", out / "keys")
+    return found | {"set": "development" if seed is not None else "sealed",
+                    "sources": committed["sources"]}  # fmt: skip
+
+
+def _drawn(out: Path, cases: int, seed: int | None, workers: int, progress: Progress) -> dict[str, Any]:
+    from icing_env.jit import source_hash
+
+    if (out / "manifest.json").is_file():
+        committed = read_json(out / "manifest.json")
+        if committed["count"] != cases:
+            raise InputError(f"{out}: holds a set of {committed['count']} cases, not {cases}; give another --out")
+    else:
+        try:
+            committed = generate(out, cases, None if seed is None else DEVELOPMENT_SEED + seed, workers, progress)
+        except ValueError as error:
+            raise InputError(f"{error}; give another --out") from error
+    wrong = tampered(out / "records", out / "keys", committed)
+    if wrong:
+        raise InputError(f"{out}: records or keys of {len(wrong)} cases are not those of the manifest, "
+                         f"the first is {wrong[0]}")
+    return committed | {"sources": source_hash("sim2real")}
+
+
+def _solve(out: Path, names: list[str], workers: int, progress: Progress) -> None:
+    answers = out / "answers"
+    answers.mkdir(exist_ok=True)
+    left = [name for name in names if not (answers / f"{name}.json").is_file()]
+    with closed(out / "keys"), ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        running = {pool.submit(solve, out / "records" / name): name for name in left}
+        for k, task in enumerate(as_completed(running), start=len(names) - len(left) + 1):
+            write_text(answers / f"{running[task]}.json", json.dumps(task.result(), allow_nan=False))
+            progress(f"diagnosed {k} of {len(names)}")
+
+
+@contextmanager
+def closed(folder: Path) -> Iterator[None]:
+    """No permission to read `folder` while the context lasts (whom the system's administrator runs as is not held)."""
+    mode = folder.stat().st_mode & 0o777
+    folder.chmod(0)
+    try:
+        yield
+    finally:
+        folder.chmod(mode)
+
+
+def solve(case: Path) -> dict[str, Any]:
+    """The diagnosis of one case's records, as `icing diagnose --json` prints it.
+
+    A record that is refused is an answer too: {"error": why}, wrong in every figure and counted as failed.
+    """
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    from icing_env.record import read
+    from sim2real.diagnosis import diagnose
+    from testbed.commands.common import plain
+    from testbed.commands.diagnose import answer
+
+    records = [read(path) for path in sorted(case.glob("*.csv"))]
+    try:
+        found: dict[str, Any] = plain(answer(diagnose(records[:DIAGNOSED], records[DIAGNOSED:])))
+    except InputError as error:
+        return {"error": str(error)}
+    return found
+
+
+def enter_ledger(path: Path, found: dict[str, Any], out: Path) -> None:
+    """Append one line to the ledger; what stands there is never changed."""
+    from testbed.withheld.files import digest_of
+
+    row = {name: found.get(name) for name in LEDGER_COLUMNS} | {
+        "date": datetime.now(UTC).isoformat(timespec="seconds"), "manifest": digest_of(out / "manifest.json")}
+    new = not path.exists()
+    with path.open("a", encoding="utf-8", newline="") as stream:
+        writer = csv.DictWriter(stream, LEDGER_COLUMNS, lineterminator="\n")
+        if new:
+            writer.writeheader()
+        writer.writerow({k: f"{v:.4g}" if isinstance(v, float) else v for k, v in row.items()})
+
+
+def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[str]]]]:
+    """For people: the headline figures of all cases, of mismatched forms, and of answers dealt to the wrong cases."""
+    headers = {"figure": "left", "all": "right", "95 %": "left", "other form": "right", "permuted": "right"}
+    names = ("cases", "failed", "identifiable_singles", "top1", "top3", "null_false_alarm", "pair_exact_set",
+             "unknown_auroc_5_to_8", "unknown_auroc_above_8", "unknown_tpr_at_5_fpr", "where_f1", "ece", "coverage95",
+             "mean_set_size", "parameter_coverage95", "closure_median", "closure_p10", "seconds_per_case")  # fmt: skip
+
+    def text(value: Any) -> str:
+        return "-" if value is None else f"{value}" if isinstance(value, int) else f"{value:.3f}"
+
+    rows = []
+    for name in names:
+        between = found["intervals95"].get(name)
+        rows.append([name.replace("_", " "), text(found[name]),
+                     f"{text(between[0])} .. {text(between[1])}" if between else "",
+                     text(found["mismatched_form"][name]), text(found["baselines"]["permuted_keys"][name])])
+    for gust, value in found["top1_by_gust"].items():
+        rows.append([f"top1, sigma_w {gust} m/s", text(value), "",
+                     text(found["mismatched_form"]["top1_by_gust"][gust]), ""])
+    return [(f"diagnosis, {found['set']} set", headers, rows)]

@@ -1,0 +1,87 @@
+"""What is drawn: the tier of each case, its effects, forms and sizes, aircraft, air and instruments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from testbed.withheld.effects import EFFECTS, Effect
+from testbed.withheld.manoeuvres import PLANS
+from testbed.withheld.numbers import DERIVATIVES
+from testbed.withheld.unknown import UNKNOWN
+
+DEVELOPMENT_SEED = 20_260_214  # sets that one may look at while writing a solver; sets for reports take the system's
+SIGMAS = (0.0, 0.5, 1.5)  # m/s
+GAINS = (0.85, 1.0, 1.15)  # of the inputs
+SCALES = (0.75, 1.3)  # of the length of turbulence
+LEVELS = (0.5, 1.0, 1.5)  # of the published noise
+SHARES = {"null": 0.375, "single": 0.375, "pair": 0.125, "unknown": 0.125}
+SPREAD, MASS_RANGE = 0.05, 0.02
+SMALLEST, LARGEST = 0.7, 2.2  # of the typical size
+MOST = {"elevator_rate_limit": 0.95}
+
+
+@dataclass(frozen=True)
+class Design:
+    """One case: everything but the random numbers of gust and noise, which come from `seed`."""
+
+    tier: str
+    parts: tuple[tuple[str, str, float], ...]  # effect, form, size
+    plan: int
+    gain: float
+    sigma: float
+    scale: float
+    level: float
+    baseline: dict[str, float]
+    seed: int
+
+
+def designs(count: int, seed: int) -> list[Design]:
+    """`count` cases in a random order; the same seed draws the same cases.
+
+    Every tier goes through gust levels, effects and forms in turn, so that each is met about equally often.
+    """
+    rng = np.random.default_rng(np.random.SeedSequence([seed, count]))
+    sizes = {tier: round(share * count) for tier, share in SHARES.items()}
+    sizes["null"] += count - sum(sizes.values())
+    found: list[Design] = []
+    for tier, size in sizes.items():
+        order = [(i, j) for i in rng.permutation(len(_pool(tier))) for j in range(2)] if tier != "null" else []
+        for k in range(size):
+            parts = _parts(tier, k, order, rng)
+            found.append(Design(
+                tier, parts, int(rng.integers(len(PLANS))), float(rng.choice(GAINS)), SIGMAS[k % 3],
+                float(rng.choice(SCALES)) if k % 3 else 1.0, float(rng.choice(LEVELS)), _baseline(rng),
+                int(rng.integers(2**62))))
+    return [found[i] for i in rng.permutation(len(found))]
+
+
+def _pool(tier: str) -> tuple[Effect, ...]:
+    return UNKNOWN if tier == "unknown" else EFFECTS
+
+
+def _parts(tier: str, k: int, order: list[tuple[int, int]], rng: np.random.Generator) -> tuple:
+    if tier == "null":
+        return ()
+    pool = _pool(tier)
+    index, form = order[k % len(order)]
+    first = pool[index]
+    chosen = [(first, ("same", "other")[form])]
+    if tier == "pair":
+        others = [e for e in EFFECTS if e.name != first.name and set(e.where) != set(first.where)]
+        chosen.append((others[int(rng.integers(len(others)))], ("same", "other")[int(rng.integers(2))]))
+    return tuple((e.name, f if tier != "unknown" else "same", _size(e, rng)) for e, f in chosen)
+
+
+def _size(effect: Effect, rng: np.random.Generator) -> float:
+    size = effect.typical * float(rng.uniform(SMALLEST, LARGEST))
+    if effect.signed and rng.random() < 0.3:
+        size = -size
+    return min(size, MOST.get(effect.name, size))
+
+
+def _baseline(rng: np.random.Generator) -> dict[str, float]:
+    """Factors on derivatives (5 %, one standard deviation, not beyond three) and on the mass (uniform)."""
+    spread = {name: 1.0 + SPREAD * float(np.clip(rng.standard_normal(), -3.0, 3.0)) for name in DERIVATIVES}
+    return {**spread, "mass": 1.0 + float(rng.uniform(-MASS_RANGE, MASS_RANGE))}

@@ -1,0 +1,80 @@
+"""One aircraft flown through one manoeuvre: published numbers, baseline spread, effects, gusts, instruments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from testbed.withheld import effects, gusts, instruments, manoeuvres, trim, unknown
+from testbed.withheld import plant as pl
+from testbed.withheld.numbers import DTYPE, KNOBS, PUBLISHED, airframe
+
+CATALOGUE = {**effects.BY_NAME, **unknown.BY_NAME}
+
+
+@dataclass(frozen=True)
+class Aircraft:
+    """What is flown: `baseline` factors by number (spread of derivatives, mass) and `parts` (effect, form, size)."""
+
+    baseline: Mapping[str, float] = field(default_factory=dict)
+    parts: Sequence[tuple[str, str, float]] = ()
+
+    def row(self) -> NDArray:
+        """Numbers of this aircraft: published, changed by the effects, then by the baseline's factors."""
+        row = airframe()
+        for name, form, size in self.parts:
+            for key, value in getattr(CATALOGUE[name], form)(size)[0].items():
+                neutral = PUBLISHED.get(key, 0.0)
+                # several effects at once: factors multiply, knobs and constants add
+                if key in KNOBS or neutral == 0.0:
+                    row[key] += value - neutral
+                else:
+                    row[key] *= value / neutral
+        for key, factor in self.baseline.items():
+            row[key] *= factor
+            if f"{key}_soft" in (DTYPE.names or ()):
+                row[f"{key}_soft"] *= factor
+        return row
+
+    def instruments(self) -> dict[str, float]:
+        """Errors of the instruments by name."""
+        wrong: dict[str, float] = {}
+        for name, form, size in self.parts:
+            for key, value in getattr(CATALOGUE[name], form)(size)[1].items():
+                wrong[key] = wrong.get(key, 0.0) + value
+        return wrong
+
+
+@dataclass(frozen=True)
+class Flown:
+    """States [N, 27], outputs [N, 9], commands [N, 5] and every exact channel."""
+
+    states: NDArray
+    outputs: NDArray
+    commands: NDArray
+    channels: dict[str, NDArray]
+
+
+def fly(aircraft: Aircraft, manoeuvre: manoeuvres.Manoeuvre, gain: float = 1.0, gust: NDArray | None = None) -> Flown:
+    """Trim and fly; still air if no gusts are given.
+
+    Raises:
+        ArithmeticError: the aircraft cannot be trimmed, or did not come back from the manoeuvre.
+    """
+    row = aircraft.row()
+    y, u = trim.trimmed(row, manoeuvre.speed)
+    plan = manoeuvres.inputs(manoeuvre, gain)
+    air = np.zeros(((len(plan) - 1) * pl.SUB + 1, 4)) if gust is None else gust
+    Y, seen, C = pl.fly(row, y, u, plan, manoeuvres.HOLD, air)
+    if not np.isfinite(Y).all() or np.max(np.abs(Y[:, [pl.PHI, pl.THETA]])) > 1.2:
+        raise ArithmeticError("the aircraft departed")
+    return Flown(Y, seen, C, instruments.exact(Y, seen, aircraft.instruments()))
+
+
+def turbulence(manoeuvre: manoeuvres.Manoeuvre, sigma: float, scale: float, rng: np.random.Generator) -> NDArray:
+    """Gusts for a manoeuvre at its speed."""
+    samples = len(manoeuvres.inputs(manoeuvre)) - 1
+    return gusts.draw(samples, sigma, scale, manoeuvre.speed, PUBLISHED["tail_arm"], rng)

@@ -1,0 +1,168 @@
+"""Draw a set of cases, fly and seal them: records in one folder, keys in another, hashes of both in a manifest.
+
+`python -m testbed.withheld.generate OUT --cases 150 [--seed N]`; without a seed the operating system gives one. What
+was finished before an interruption is kept.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import secrets
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
+from itertools import groupby
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from testbed.withheld import files, instruments, numbers
+from testbed.withheld.draw import Design, designs
+from testbed.withheld.flights import CATALOGUE, Aircraft, fly, turbulence
+from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
+from testbed.withheld.separation import Distances, Geometry, distances, geometry
+
+TRIES, SMALLER = 8, 0.75  # an aircraft that departs gets a smaller effect
+
+
+def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
+             progress: Callable[[str], None] = lambda text: None) -> dict[str, Any]:
+    """Make (or finish) a sealed set in `out`: `records/`, `keys/`, `manifest.json`.
+
+    Args:
+        out: a folder, made if absent.
+        cases: how many.
+        seed: for development; from the operating system if omitted.
+        workers: processes.
+        progress: told after every group of cases.
+
+    Returns:
+        The manifest.
+
+    Raises:
+        ValueError: `out` holds another set than the one asked for.
+    """
+    records, keys = out / "records", out / "keys"
+    for folder in (records, keys):
+        folder.mkdir(parents=True, exist_ok=True)
+    names, seed = _roll(keys / "seed.json", cases, seed)
+    jobs = [(name, design) for name, design in zip(names, designs(cases, seed), strict=True)
+            if not ((records / name).is_dir() and (keys / f"{name}.json").is_file())]
+    groups = [list(group) for _, group in groupby(sorted(jobs, key=lambda job: _bank_of(job[1])),
+                                                  key=lambda job: _bank_of(job[1]))]
+    done = cases - len(jobs)
+    if workers == 1:
+        for group in groups:
+            done += _make(group, records, keys)
+            progress(f"flown {done} of {cases}")
+    elif groups:
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+            for made in pool.map(_make, groups, [records] * len(groups), [keys] * len(groups)):
+                done += made
+                progress(f"flown {done} of {cases}")
+    sealed = files.manifest(records, keys, names) | {"numbers": numbers.digest(), "count": cases}
+    files.write_text(out / "manifest.json", json.dumps(sealed, indent=1))
+    return sealed
+
+
+def _roll(path: Path, cases: int, seed: int | None) -> tuple[list[str], int]:
+    """Names and seed of the set, kept with the keys so that an interrupted draw goes on as it began."""
+    if path.is_file():
+        kept = files.read_json(path)
+        if kept["cases"] != cases or (seed is not None and kept["seed"] != seed):
+            raise ValueError(f"{path.parent.parent} holds a set of {kept['cases']} cases with another seed or number")
+        return kept["names"], kept["seed"]
+    given = seed is not None
+    seed = seed if seed is not None else secrets.randbits(120)
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
+    names: list[str] = []
+    while len(names) < cases:
+        name = rng.bytes(5).hex() if given else secrets.token_hex(5)
+        if name not in names:
+            names.append(name)
+    files.write_text(path, json.dumps({"cases": cases, "seed": seed, "names": names}))
+    return names, seed
+
+
+def _bank_of(design: Design) -> tuple[int, float]:
+    return design.plan, design.gain
+
+
+def _geometry_of(design: Design) -> tuple[float, float, float]:
+    return design.sigma, design.scale, design.level
+
+
+def _make(group: list[tuple[str, Design]], records: Path, keys: Path) -> int:
+    """Fly and write cases of one plan; cases that share gust and noise share their whitened bank."""
+    group = sorted(group, key=lambda job: _geometry_of(job[1]))
+    for _, same in groupby(group, key=lambda job: _geometry_of(job[1])):
+        shape: Geometry | None = None
+        for name, design in same:
+            if shape is None and design.parts:
+                shape = geometry(design.plan, design.gain, design.sigma, design.scale, design.level)
+            texts, key = make_case(name, design, shape)
+            files.write_text(keys / f"{name}.json", json.dumps(key, indent=1))
+            files.write_case(records / name, texts)
+    return len(group)
+
+
+def make_case(name: str, design: Design, shape: Geometry | None) -> tuple[dict[str, str], dict[str, Any]]:
+    """Files of one case by name, and its key.
+
+    Args:
+        name: says nothing.
+        design: what to fly.
+        shape: where distances are measured; None for a case without effects.
+    """
+    parts = list(design.parts)
+    for _ in range(TRIES):
+        try:
+            return _flown(name, design, tuple(parts), shape)
+        except ArithmeticError:
+            parts = [(effect, form, SMALLER * size) for effect, form, size in parts]
+    raise ArithmeticError(f"no size of {[p[0] for p in parts]} can be flown")
+
+
+def _flown(name: str, design: Design, parts: tuple[tuple[str, str, float], ...],
+           shape: Geometry | None) -> tuple[dict[str, str], dict[str, Any]]:
+    aircraft = Aircraft(design.baseline, parts)
+    texts: dict[str, str] = {}
+    for i, manoeuvre in enumerate(PLANS[design.plan]):
+        rng = np.random.default_rng(np.random.SeedSequence([design.seed, i]))
+        flown = fly(aircraft, manoeuvre, design.gain, turbulence(manoeuvre, design.sigma, design.scale, rng))
+        read = instruments.read(flown.channels, design.level, rng)
+        texts[f"{i + 1}.csv"] = files.record_text(read, flown.commands)
+        texts[f"{i + 1}.toml"] = files.side_text(name, "diagnose" if i < DIAGNOSED else "held_out")
+    found = Distances(0.0, {}, 0.0)
+    if parts and shape is not None:
+        found = distances(design.plan, design.gain, shape, parts)
+    return texts, _key(name, design, parts, found)
+
+
+def _key(name: str, design: Design, parts: tuple[tuple[str, str, float], ...], found: Distances) -> dict[str, Any]:
+    where = sorted({place for effect, _, _ in parts for place in CATALOGUE[effect].where})
+    return {
+        "case": name, "salt": secrets.token_hex(16), "tier": design.tier, "sigma_w": design.sigma,
+        "effects": [effect for effect, _, _ in parts], "forms": [form for _, form, _ in parts],
+        "parameters": {effect: {CATALOGUE[effect].parameter: size} for effect, _, size in parts},
+        "where": where, "D_none": found.none, "D": found.rivals, "D_pair": found.pair,
+        "design": {k: v for k, v in asdict(design).items() if k not in ("tier", "parts")},
+    }  # fmt: skip
+
+
+def main() -> None:
+    """Command line of the generator alone, for those who draw a set apart from the solver."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--cases", type=int, default=2400)
+    parser.add_argument("--seed", type=int, default=None)
+    parser.add_argument("--workers", type=int, default=1)
+    given = parser.parse_args()
+    generate(given.out, given.cases, given.seed, given.workers, print)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,237 @@
+"""Score answers of `icing diagnose --json` against the keys of a sealed set, with json and NumPy alone.
+
+`python score.py ANSWERS KEYS`: two folders with one JSON file per case. Figures of the interface, with bootstrap 95 %
+intervals over cases. What counts as right is said in docs/benchmark_diagnosis.md.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+DETECTABLE, APART, SAME = 6.0, 5.0, 3.5  # D to none; D beyond which a rival is another; D within which it is not
+BINS, LOWEST, HIGHEST = 15, 0.02, 0.98
+Case = dict[str, Any]
+
+
+def load(answers: Path, keys: Path) -> list[Case]:
+    """A flat record of every answered case, ordered by name.
+
+    Raises:
+        ValueError: an answer without a key, or none at all.
+    """
+    found = []
+    for path in sorted(answers.glob("*.json")):
+        key = keys / path.name
+        if not key.is_file():
+            raise ValueError(f"{path.name}: no key of that name in {keys}")
+        found.append(flat(json.loads(path.read_text()), json.loads(key.read_text())))
+    if not found:
+        raise ValueError(f"no answers in {answers}")
+    return found
+
+
+def flat(answer: dict[str, Any], key: dict[str, Any]) -> Case:
+    """What the figures need of one answer and its key. An answer {"error": ...} is wrong everywhere."""
+    hypotheses = sorted(answer.get("hypotheses", []), key=lambda h: -h["probability"])
+    truth = _truth(key)
+    listed = [(frozenset(h["effects"]), bool(h["unknown"])) for h in hypotheses]
+    inclusion: dict[str, float] = {}
+    for h in hypotheses:
+        for name in h["effects"]:
+            inclusion[name] = inclusion.get(name, 0.0) + h["probability"]
+    told = [_label(answer["hypotheses"][i]) for i in answer.get("credible_set_95", [])]
+    places = answer.get("where", {}).get("components", {})
+    held = answer.get("gap", {}).get("held_out", {})
+    return {
+        "tier": key["tier"], "sigma": key["sigma_w"], "other": "other" in key["forms"], "truth": truth,
+        "effects": tuple(key["effects"]), "failed": "error" in answer, "none": key["D_none"], "pair": key["D_pair"],
+        "identifiable": identifiable(key),
+        "top1": bool(listed) and (listed[0] == truth or _in_class(answer, listed[0], key)),
+        "exact": bool(listed) and listed[0] == truth, "top3": truth in listed[:3],
+        "alarm": answer.get("verdict") != "no_gap",
+        "p_unknown": sum(h["probability"] for h in hypotheses if h["unknown"]),
+        "p_truth": sum(h["probability"] for h in hypotheses if _label(h) == truth),
+        "inclusion": [(p, name in key["effects"]) for name, p in sorted(inclusion.items())],
+        "covered": truth in told, "size": len(told), "closure": held.get("closure"),
+        "seen": frozenset(c for c, p in places.items() if p >= 0.5), "where": frozenset(key["where"]),
+        "interval": _interval(answer, key), "seconds": answer.get("seconds"),
+    }  # fmt: skip
+
+
+def _truth(key: dict[str, Any]) -> tuple[frozenset[str], bool]:
+    return (frozenset(), True) if key["tier"] == "unknown" else (frozenset(key["effects"]), False)
+
+
+def _label(hypothesis: dict[str, Any]) -> tuple[frozenset[str], bool]:
+    return frozenset(hypothesis["effects"]), bool(hypothesis["unknown"])
+
+
+def identifiable(key: dict[str, Any]) -> bool:
+    """Whether an ideal observer could name the single effect: it stands out, and nearer to its name than to others."""
+    if key["tier"] != "single" or key["D_none"] < DETECTABLE:
+        return False
+    own = key["D"][key["effects"][0]]
+    rival = min(d for name, d in key["D"].items() if name not in key["effects"])
+    return bool(rival**2 - own**2 >= APART**2)
+
+
+def _in_class(answer: dict[str, Any], first: tuple[frozenset[str], bool], key: dict[str, Any]) -> bool:
+    """Whether the truth is in the class stated with the first effect, every member of it truly that near."""
+    names, unknown = first
+    if key["tier"] != "single" or unknown or len(names) != 1:
+        return False
+    (name,) = names
+    entry = next((e for e in answer["effects"] if e["name"] == name), None)
+    members = {name, *(entry or {}).get("indistinguishable_from", [])}
+    return key["effects"][0] in members and all(
+        key["D"].get(m, math.inf) < SAME for m in members - {key["effects"][0]})
+
+
+def _interval(answer: dict[str, Any], key: dict[str, Any]) -> bool | None:
+    """Whether the interval holds the parameter: single effects in the library's form that were named; else None."""
+    if key["tier"] != "single" or "other" in key["forms"]:
+        return None
+    entry = next((e for e in answer.get("effects", []) if e["name"] == key["effects"][0]), None)
+    (parameter, value), = key["parameters"][key["effects"][0]].items()
+    if entry is None or entry["probability"] < 0.5 or parameter not in entry["parameters"]:
+        return None
+    told = entry["parameters"][parameter]
+    return bool(told["low95"] <= value <= told["high95"])
+
+
+def share(values: Sequence[Any]) -> float | None:
+    """Mean of truth values; None of none."""
+    known = [float(v) for v in values if v is not None]
+    return float(np.mean(known)) if known else None
+
+
+def auroc(positive: Sequence[float], negative: Sequence[float]) -> float | None:
+    """Probability that a positive scores above a negative, ties counted half."""
+    if not positive or not negative:
+        return None
+    p, n = np.asarray(positive)[:, None], np.sort(np.asarray(negative))
+    below, upto = np.searchsorted(n, p, "left"), np.searchsorted(n, p, "right")
+    return float(np.mean((below + upto) / 2.0) / len(n))
+
+
+def _unknown(cases: Sequence[Case], low: float, high: float) -> tuple[list[float], list[float]]:
+    """P(unknown) of unknown effects with D to the nearest pair within bounds, and of library gaps as detectable."""
+    chosen = [c for c in cases if c["tier"] == "unknown" and low <= c["pair"] < high]
+    if not chosen:
+        return [], []
+    nearest, farthest = min(c["none"] for c in chosen), max(c["none"] for c in chosen)
+    matched = [c["p_unknown"] for c in cases
+               if c["tier"] in ("single", "pair") and nearest <= c["none"] <= farthest]
+    return [c["p_unknown"] for c in chosen], matched
+
+
+def tpr_at(positive: Sequence[float], negative: Sequence[float], false: float = 0.05) -> float | None:
+    """Share of positives above the threshold that `false` of the negatives exceed."""
+    if not positive or not negative:
+        return None
+    return float(np.mean(np.asarray(positive) > np.quantile(negative, 1.0 - false)))
+
+
+def calibration_error(cases: Sequence[Case]) -> float | None:
+    """Mean |share true - mean probability| over equal-count bins of inclusion probabilities."""
+    pairs = sorted(pair for c in cases for pair in c["inclusion"] if LOWEST <= pair[0] <= HIGHEST)
+    if len(pairs) < BINS:
+        return None
+    parts = np.array_split(np.array(pairs, dtype=float), BINS)
+    return float(np.mean([abs(part[:, 0].mean() - part[:, 1].mean()) for part in parts]))
+
+
+def f1(cases: Sequence[Case]) -> float | None:
+    """Of components named with probability at least one half, over detectable single effects."""
+    chosen = [c for c in cases if c["tier"] == "single" and c["none"] >= DETECTABLE]
+    right = sum(len(c["seen"] & c["where"]) for c in chosen)
+    total = sum(len(c["seen"]) + len(c["where"]) for c in chosen)
+    return 2.0 * right / total if total else None
+
+
+def figures(cases: Sequence[Case]) -> dict[str, Any]:
+    """The figures of the interface for a set of cases; None where it holds none of the kind."""
+    clear = [c for c in cases if c["identifiable"]]
+    nulls = [c for c in cases if c["tier"] == "null"]
+    beyond = _unknown(cases, APART, math.inf)
+    closures = [c["closure"] for c in cases if c["tier"] in ("single", "pair") and c["closure"] is not None]
+    seconds = [c["seconds"] for c in cases if c["seconds"] is not None]
+    return {
+        "cases": len(cases), "failed": sum(c["failed"] for c in cases), "identifiable_singles": len(clear),
+        "top1": share([c["top1"] for c in clear]),
+        "top1_by_gust": {f"{s:g}": share([c["top1"] for c in clear if c["sigma"] == s]) for s in (0.0, 0.5, 1.5)},
+        "top3": share([c["top3"] or c["top1"] for c in clear]),
+        "null_false_alarm": share([c["alarm"] for c in nulls]),
+        "pair_exact_set": share([c["exact"] for c in cases if c["tier"] == "pair"]),
+        "unknown_auroc_5_to_8": auroc(*_unknown(cases, APART, 8.0)),
+        "unknown_auroc_above_8": auroc(*_unknown(cases, 8.0, math.inf)),
+        "unknown_tpr_at_5_fpr": tpr_at(*beyond), "where_f1": f1(cases), "ece": calibration_error(cases),
+        "coverage95": share([c["covered"] for c in cases]),
+        "mean_set_size": share([c["size"] for c in cases if not c["failed"]]),
+        "parameter_coverage95": share([c["interval"] for c in cases]),
+        "log_score": float(np.mean([-math.log(max(c["p_truth"], 1e-6)) for c in cases])) if cases else None,
+        "closure_median": float(np.median(closures)) if closures else None,
+        "closure_p10": float(np.quantile(closures, 0.1)) if closures else None, "oracle_fraction": None,
+        "seconds_per_case": float(np.mean(seconds)) if seconds else None,
+    }  # fmt: skip
+
+
+def intervals(cases: Sequence[Case], repeats: int = 200) -> dict[str, list[float]]:
+    """Bootstrap 95 % intervals over cases of every figure that is one number."""
+    rng, found = np.random.default_rng(0), {}
+    drawn = [figures([cases[i] for i in rng.integers(0, len(cases), len(cases))]) for _ in range(repeats)]
+    for name in figures(cases):
+        values = [d[name] for d in drawn if isinstance(d[name], int | float)]
+        if len(values) > repeats // 2 and name not in ("cases", "failed"):
+            found[name] = [float(np.quantile(values, q)) for q in (0.025, 0.975)]
+    return found
+
+
+def by_tier(cases: Sequence[Case]) -> dict[str, Any]:
+    """What each tier shows by itself; every effect's recall under "single"."""
+    tiers: dict[str, Any] = {}
+    rules: dict[str, Callable[[Case], bool]] = {
+        "null": lambda c: not c["alarm"], "single": lambda c: c["top1"], "pair": lambda c: c["exact"],
+        "unknown": lambda c: c["exact"]}  # fmt: skip
+    for tier, rule in rules.items():
+        chosen = [c for c in cases if c["tier"] == tier]
+        tiers[tier] = {"cases": len(chosen), "right": share([rule(c) for c in chosen]),
+                       "detectable": sum(c["none"] >= DETECTABLE for c in chosen),
+                       "right_by_gust": {f"{s:g}": share([rule(c) for c in chosen if c["sigma"] == s])
+                                         for s in (0.0, 0.5, 1.5)}}  # fmt: skip
+    clear = [c for c in cases if c["identifiable"]]
+    names = sorted({c["effects"][0] for c in clear})
+    tiers["single"]["recall"] = {n: share([c["top1"] for c in clear if c["effects"] == (n,)]) for n in names}
+    return tiers
+
+
+def baselines(answers: Path, keys: Path, cases: Sequence[Case]) -> dict[str, Any]:
+    """What knowing nothing scores: the answers dealt to other cases, and "no gap" always."""
+    found = sorted(answers.glob("*.json"))
+    dealt = np.random.default_rng(0).permutation(len(found))
+    permuted = [flat(json.loads(found[i].read_text()), json.loads((keys / path.name).read_text()))
+                for i, path in zip(dealt, found, strict=True)]
+    silent = {"verdict": "no_gap", "hypotheses": [{"effects": [], "unknown": False, "probability": 1.0}],
+              "credible_set_95": [0], "effects": [], "where": {"components": {}}, "gap": {"held_out": {}}}
+    always = [flat(silent, json.loads((keys / path.name).read_text())) for path in found]
+    return {"permuted_keys": figures(permuted), "always_no_gap": figures(always)}
+
+
+def score(answers: Path, keys: Path) -> dict[str, Any]:
+    """Every figure of the interface, intervals, tiers, mismatched forms (nulls and unknown included) and baselines."""
+    cases = load(answers, keys)
+    mismatched = [c for c in cases if c["tier"] in ("null", "unknown") or c["other"]]
+    return {**figures(cases), "intervals95": intervals(cases), "by_tier": by_tier(cases),
+            "mismatched_form": {**figures(mismatched), "intervals95": intervals(mismatched)},
+            "baselines": baselines(answers, keys, cases)}  # fmt: skip
+
+
+if __name__ == "__main__":
+    print(json.dumps(score(Path(sys.argv[1]), Path(sys.argv[2])), indent=2))

@@ -1,0 +1,126 @@
+"""Distances of a case from none, from every library effect and from every pair of them, nuisances integrated out.
+
+Measured on the published aircraft: the effects of a case, flown in still air without the case's own spread. A rival
+may be any combination of its departures at SIZES of its typical size, which follows its curvature with size (and a
+little more: distances to strongly curved rivals are rather too small).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from testbed.withheld import distance, effects
+from testbed.withheld.distance import Whitener
+from testbed.withheld.draw import MASS_RANGE, MOST, SPREAD
+from testbed.withheld.flights import Aircraft, Flown, fly
+from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
+from testbed.withheld.numbers import DERIVATIVES
+
+MASS_SPREAD = MASS_RANGE / 3**0.5  # of a uniform distribution
+NUISANCES = (*((name, 1.0 + SPREAD) for name in DERIVATIVES if name != "Cn_aileron"), ("mass", 1.0 + MASS_SPREAD))
+RIVALS = tuple(effect.name for effect in effects.EFFECTS)
+SIZES = (0.9, 1.8)  # of the typical size, the same sign
+FEW = 12  # nearest rivals from which pairs are made, each with every other
+Part = tuple[str, str, float]
+
+
+@dataclass(frozen=True)
+class Bank:
+    """Departures of nuisances, then of every rival at SIZES, for each diagnosed manoeuvre of one plan."""
+
+    still: list[Flown]
+    motion: list[NDArray]  # [samples, 12, columns]
+    inputs: list[NDArray]
+    paths: list[NDArray]  # [samples*7, columns] at noise level 1
+
+
+@lru_cache(maxsize=1)
+def bank(plan: int, gain: float) -> Bank:
+    """Flown in still air by the published aircraft."""
+    stills, motion, inputs, paths = [], [], [], []
+    for manoeuvre in PLANS[plan][:DIAGNOSED]:
+        still = fly(Aircraft(), manoeuvre, gain)
+        own = distance.paths(still, 1.0)
+        columns = [fly(Aircraft(baseline={name: factor}), manoeuvre, gain) for name, factor in NUISANCES]
+        columns += [fly(Aircraft(parts=((e.name, "same", min(size * e.typical, MOST.get(e.name, 9.0))),)), manoeuvre,
+                        gain) for e in effects.EFFECTS for size in SIZES]
+        stills.append(still)
+        pairs = [distance.departures(flown, still) for flown in columns]
+        motion.append(np.stack([y for y, _ in pairs], axis=2))
+        inputs.append(np.stack([u for _, u in pairs], axis=2))
+        paths.append(np.column_stack([distance.paths(flown, 1.0) - own for flown in columns]))
+    return Bank(stills, motion, inputs, paths)
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Whitened bank of one plan, gust and noise level, ready to compare cases with."""
+
+    filters: list[Whitener]
+    starts: list[NDArray]  # whitened starts, and the inverse of their Gram matrix with its prior
+    columns: list[NDArray]
+    gram: NDArray
+    level: float
+
+
+def geometry(plan: int, gain: float, sigma: float, scale: float, level: float) -> Geometry:
+    """Whiten the bank of (plan, gain) as a case with this gust and noise sees it."""
+    held = bank(plan, gain)
+    filters = [distance.whitener(m.speed, sigma, scale, level) for m in PLANS[plan][:DIAGNOSED]]
+    starts, columns = [], []
+    for w, y, u, p in zip(filters, held.motion, held.inputs, held.paths, strict=True):
+        silent = np.zeros((len(y), 12, 10)), np.zeros((len(y), 5, 10))
+        s = distance.whiten(w, *silent, w.starts)
+        starts.append(s)
+        columns.append(np.vstack([_clear(distance.whiten(w, y, u), s), p / level]))
+    gram = np.sum([c.T @ c for c in columns], axis=0)
+    return Geometry(filters, starts, columns, np.asarray(gram), level)
+
+
+def _clear(y: NDArray, starts: NDArray) -> NDArray:
+    """`y` without what another start of the manoeuvre could have made (whose spread is wide: plain projection)."""
+    return np.asarray(y - starts @ np.linalg.lstsq(starts, y, rcond=1e-9)[0])
+
+
+@dataclass(frozen=True)
+class Distances:
+    """D from none; from each library effect, its size free; from the nearest and (nearest) pair."""
+
+    none: float
+    rivals: dict[str, float]
+    pair: float
+
+
+def distances(plan: int, gain: float, g: Geometry, parts: Sequence[Part]) -> Distances:
+    """Of the effects `parts` on the published aircraft, in the plan, gust and noise of `g`."""
+    total, cross, held = 0.0, np.zeros(len(g.gram)), bank(plan, gain)
+    everything = zip(PLANS[plan], g.filters, g.starts, g.columns, held.still, strict=False)
+    for manoeuvre, w, s, columns, still in everything:
+        flown = fly(Aircraft(parts=tuple(parts)), manoeuvre, gain)
+        y, u = distance.departures(flown, still)
+        white = _clear(distance.whiten(w, y[:, :, None], u[:, :, None]), s)[:, 0]
+        column = np.concatenate([white, distance.paths(flown, g.level) - distance.paths(still, g.level)])
+        total += float(column @ column)
+        cross += columns.T @ column
+    k = len(NUISANCES)
+    prior = np.linalg.inv(g.gram[:k, :k] + np.eye(k))
+    own = float(total - cross[:k] @ prior @ cross[:k])
+    to = cross[k:] - g.gram[k:, :k] @ prior @ cross[:k]
+    among = g.gram[k:, k:] - g.gram[k:, :k] @ prior @ g.gram[:k, k:]
+    singles = {name: _left(own, to, among, (i,)) for i, name in enumerate(RIVALS)}
+    nearest = sorted(range(len(RIVALS)), key=lambda i: singles[RIVALS[i]])
+    pairs = [_left(own, to, among, (i, j)) for i in nearest[:FEW] for j in range(len(RIVALS)) if i != j]
+    return Distances(max(own, 0.0) ** 0.5, singles, min(pairs))
+
+
+def _left(own: float, to: NDArray, among: NDArray, chosen: tuple[int, ...]) -> float:
+    """Distance that remains when the chosen rivals take any size."""
+    at = [len(SIZES) * i + j for i in chosen for j in range(len(SIZES))]
+    block = among[np.ix_(at, at)]
+    block = block + np.diag(1e-9 * np.diag(block) + 1e-9)
+    return max(own - float(to[at] @ np.linalg.solve(block, to[at])), 0.0) ** 0.5

@@ -1,0 +1,93 @@
+"""The benchmark's own plant against the simulator: the same flight, and the same effects where forms are the same."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from icing_env import aircraft
+from icing_env import effects as library
+from icing_env.simulate import Fleet
+from sim2real.channels import TOLERANCE
+from testbed.withheld import effects, manoeuvres
+from testbed.withheld import plant as pl
+from testbed.withheld.flights import Aircraft, Flown, fly
+from testbed.withheld.instruments import FAST
+
+CRUISE = manoeuvres.PLANS[0][1]
+# Both follow the same document; the integrators and steps differ, and the recording's low pass is told to a step.
+CLOSE = 0.02  # tolerances of 14 CFR Part 60 and the like
+SURFACES = ("elevator", "aileron", "rudder")
+
+
+def flown_again(flown: list[Flown], parameters: NDArray, samples: int) -> dict[str, NDArray]:
+    """The simulator from each flight's start under its commands, without noise: channels [flights, samples]."""
+    p = parameters.copy()
+    for name in p.dtype.names:
+        if name.startswith("noise_"):
+            p[name] = 0.0
+    fleet = Fleet(p, len(flown), pl.DT, 4)
+    y = np.array([f.states[0] for f in flown])
+    s = fleet.state
+    for name, column in (("altitude", pl.H), ("u", pl.U), ("v", pl.V), ("w", pl.W), ("p", pl.P), ("q", pl.Q),
+                         ("r", pl.R), ("elevator", pl.DE), ("aileron", pl.DA), ("rudder", pl.DR),
+                         ("power_left", pl.PL), ("power_right", pl.PR), ("alpha_downwash", pl.ADW)):  # fmt: skip
+        s[name] = y[:, column]
+    half_phi, half_theta = y[:, pl.PHI] / 2, y[:, pl.THETA] / 2
+    s["e0"], s["e1"] = np.cos(half_phi) * np.cos(half_theta), np.sin(half_phi) * np.cos(half_theta)
+    s["e2"], s["e3"] = np.cos(half_phi) * np.sin(half_theta), -np.sin(half_phi) * np.sin(half_theta)
+    names = (*SURFACES, "throttle_left", "throttle_right")
+    out = {c: np.empty((len(flown), samples)) for c in FAST}
+    for k in range(samples):
+        for j, name in enumerate(names):
+            fleet.command[name] = [f.commands[k, j] for f in flown]
+        fleet.start() if k == 0 else fleet.step()
+        for c in FAST:
+            out[c][:, k] = fleet.measurement[c]
+    return out
+
+
+def test_calm_flight_is_the_simulators():
+    still = fly(Aircraft(), CRUISE)
+    ours = flown_again([still], aircraft.load(), 2001)
+    for c in FAST:
+        allowed = CLOSE * TOLERANCE[c] if c in TOLERANCE else 2e-3
+        assert np.max(np.abs(ours[c][0] - still.channels[c])) < allowed, c
+
+
+def test_effects_of_the_same_form_are_the_librarys():
+    samples, parts, rows = 600, [], []
+    for effect in effects.EFFECTS:
+        parts.append((effect.name, "same", effect.typical))
+        rows.append(library.with_effects(aircraft.load(), {effect.name: {effect.parameter: effect.typical}}))
+    p = np.concatenate(rows)
+    p["wind_reference_altitude"] = 2200.0
+    flown = [fly(Aircraft(parts=(part,)), CRUISE) for part in parts]
+    ours, still = flown_again(flown, p, samples), fly(Aircraft(), CRUISE)
+    wrong = {}
+    for i, part in enumerate(parts):
+        for c in FAST:
+            size = np.max(np.abs(flown[i].channels[c][:samples] - still.channels[c][:samples]))
+            allowed = (CLOSE * TOLERANCE[c] if c in TOLERANCE else 2e-3) + 0.05 * size
+            error = np.max(np.abs(ours[c][i] - flown[i].channels[c][:samples]))
+            if error > allowed:
+                wrong[part[0], c] = error / allowed
+    assert not wrong
+
+
+def test_every_effect_of_the_library_but_turbulence_is_drawn():
+    assert {e.name for e in effects.EFFECTS} == set(library.LIBRARY) - {"turbulence"}
+    for effect in effects.EFFECTS:
+        typical = library.LIBRARY[effect.name].typical()
+        assert effect.typical == pytest.approx(typical[effect.parameter])
+
+
+def test_the_generator_and_the_scorer_load_nothing_of_the_project():
+    code = ("import sys, testbed.withheld.generate, testbed.withheld.score; "
+            "print([m for m in sys.modules if m.split('.')[0] in ('icing_env','sim2real','estimators','controllers')])")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
