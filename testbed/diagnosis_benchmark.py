@@ -25,6 +25,7 @@ from testbed.withheld.manoeuvres import DIAGNOSED
 from testbed.withheld.score import score
 
 QUICK, FULL = 150, 2400
+OPEN = 0o700  # of the key folder outside the diagnosis
 LEDGER_COLUMNS = ("date", "set", "cases", "sources", "manifest", "top1", "top3", "null_false_alarm", "pair_exact_set",
                   "unknown_auroc_above_8", "where_f1", "ece", "coverage95", "closure_median")  # fmt: skip
 Progress = Callable[[str], None]
@@ -54,6 +55,8 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
 def _drawn(out: Path, cases: int, seed: int | None, workers: int, progress: Progress) -> dict[str, Any]:
     from icing_env.jit import source_hash
 
+    if (out / "keys").is_dir():
+        (out / "keys").chmod(OPEN)  # a run that was killed left it closed
     if (out / "manifest.json").is_file():
         committed = read_json(out / "manifest.json")
         if committed["count"] != cases:
@@ -83,13 +86,12 @@ def _solve(out: Path, names: list[str], workers: int, progress: Progress) -> Non
 
 @contextmanager
 def closed(folder: Path) -> Iterator[None]:
-    """No permission to read `folder` while the context lasts (whom the system's administrator runs as is not held)."""
-    mode = folder.stat().st_mode & 0o777
+    """No permission to read `folder` while the context lasts (which does not hold the system's administrator)."""
     folder.chmod(0)
     try:
         yield
     finally:
-        folder.chmod(mode)
+        folder.chmod(OPEN)
 
 
 def solve(case: Path) -> dict[str, Any]:

@@ -35,6 +35,7 @@ class Design:
     level: float
     baseline: dict[str, float]
     seed: int
+    target: float = 0.0  # distance to the nearest pair of library effects that an unknown effect is scaled to
 
 
 def designs(count: int, seed: int) -> list[Design]:
@@ -47,13 +48,14 @@ def designs(count: int, seed: int) -> list[Design]:
     sizes["null"] += count - sum(sizes.values())
     found: list[Design] = []
     for tier, size in sizes.items():
-        order = [(i, j) for i in rng.permutation(len(_pool(tier))) for j in range(2)] if tier != "null" else []
+        forms = 1 if tier == "unknown" else 2
+        order = [divmod(int(n), forms) for n in rng.permutation(forms * len(_pool(tier)))]
         for k in range(size):
             parts = _parts(tier, k, order, rng)
             found.append(Design(
                 tier, parts, int(rng.integers(len(PLANS))), float(rng.choice(GAINS)), SIGMAS[k % 3],
                 float(rng.choice(SCALES)) if k % 3 else 1.0, float(rng.choice(LEVELS)), _baseline(rng),
-                int(rng.integers(2**62))))
+                int(rng.integers(2**62)), _target(rng) if tier == "unknown" else 0.0))
     return [found[i] for i in rng.permutation(len(found))]
 
 
@@ -79,6 +81,12 @@ def _size(effect: Effect, rng: np.random.Generator) -> float:
     if effect.signed and rng.random() < 0.3:
         size = -size
     return min(size, MOST.get(effect.name, size))
+
+
+def _target(rng: np.random.Generator) -> float:
+    """A third within 5 to 8, the rest beyond, evenly in the logarithm."""
+    low, high = (5.0, 8.0) if rng.random() < 1.0 / 3.0 else (8.0, 80.0)
+    return float(low * (high / low) ** rng.random())
 
 
 def _baseline(rng: np.random.Generator) -> dict[str, float]:

@@ -26,6 +26,8 @@ from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
 from testbed.withheld.separation import Distances, Geometry, distances, geometry
 
 TRIES, SMALLER = 8, 0.75  # an aircraft that departs gets a smaller effect
+SMALLEST_FACTOR = 0.01  # by which an unknown effect is scaled down
+Parts = tuple[tuple[str, str, float], ...]
 
 
 def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
@@ -126,8 +128,13 @@ def make_case(name: str, design: Design, shape: Geometry | None) -> tuple[dict[s
     raise ArithmeticError(f"no size of {[p[0] for p in parts]} can be flown")
 
 
-def _flown(name: str, design: Design, parts: tuple[tuple[str, str, float], ...],
+def _flown(name: str, design: Design, parts: Parts,
            shape: Geometry | None) -> tuple[dict[str, str], dict[str, Any]]:
+    found = Distances(0.0, {}, 0.0)
+    if parts and shape is not None:
+        found = distances(design.plan, design.gain, shape, parts)
+        if design.target:
+            parts, found = _scaled(design, shape, parts, found)
     aircraft = Aircraft(design.baseline, parts)
     texts: dict[str, str] = {}
     for i, manoeuvre in enumerate(PLANS[design.plan]):
@@ -136,13 +143,20 @@ def _flown(name: str, design: Design, parts: tuple[tuple[str, str, float], ...],
         read = instruments.read(flown.channels, design.level, rng)
         texts[f"{i + 1}.csv"] = files.record_text(read, flown.commands)
         texts[f"{i + 1}.toml"] = files.side_text(name, "diagnose" if i < DIAGNOSED else "held_out")
-    found = Distances(0.0, {}, 0.0)
-    if parts and shape is not None:
-        found = distances(design.plan, design.gain, shape, parts)
     return texts, _key(name, design, parts, found)
 
 
-def _key(name: str, design: Design, parts: tuple[tuple[str, str, float], ...], found: Distances) -> dict[str, Any]:
+def _scaled(design: Design, shape: Geometry, parts: Parts, found: Distances) -> tuple[Parts, Distances]:
+    """An unknown effect at the size that stands `design.target` from the nearest pair, taken as proportional."""
+    factor = min(max(design.target / max(found.pair, 1e-6), SMALLEST_FACTOR), 1.0 / SMALLER)
+    smaller = tuple((effect, form, factor * size) for effect, form, size in parts)
+    there = distances(design.plan, design.gain, shape, smaller)
+    if there.pair < 0.3 * design.target:  # a dead zone or a delay that has vanished altogether
+        return parts, found
+    return smaller, there
+
+
+def _key(name: str, design: Design, parts: Parts, found: Distances) -> dict[str, Any]:
     where = sorted({place for effect, _, _ in parts for place in CATALOGUE[effect].where})
     return {
         "case": name, "salt": secrets.token_hex(16), "tier": design.tier, "sigma_w": design.sigma,

@@ -95,7 +95,8 @@ def exact(Y: NDArray, seen: NDArray, s: Mapping[str, float]) -> dict[str, NDArra
     c["alpha"], c["beta"] = vanes(Y, seen, s)
     c["alpha"] = c["alpha"] * (1.0 + s.get("scale_alpha", 0.0)) + s.get("scale_alpha2", 0.0) * c["alpha"] ** 2 / 0.06
     raw = {"p": Y[:, pl.P], "q": Y[:, pl.Q], "r": Y[:, pl.R],
-           "ax": seen[:, pl.FX], "ay": seen[:, pl.FY], "az": seen[:, pl.FZ], "elevator": Y[:, pl.DE], "aileron": Y[:, pl.DA], "rudder": Y[:, pl.DR]}  # fmt: skip
+           "ax": seen[:, pl.FX], "ay": seen[:, pl.FY], "az": seen[:, pl.FZ], "elevator": Y[:, pl.DE],
+           "aileron": Y[:, pl.DA], "rudder": Y[:, pl.DR]}  # fmt: skip
     if s.get("flexible_az"):
         raw["az"] = raw["az"] + s["flexible_az"] * (oscillator(raw["az"], 3.2, 0.08) - raw["az"])
     raw["q"] = raw["q"] + s.get("gyro_g", 0.0) * (raw["az"] + G0) + s.get("gyro_cross", 0.0) * Y[:, pl.P]
@@ -104,7 +105,7 @@ def exact(Y: NDArray, seen: NDArray, s: Mapping[str, float]) -> dict[str, NDArra
           "psi": Y[:, pl.PSI]}  # fmt: skip
     for name in ("alpha", "beta", "q", "theta", "ax", "az"):
         wander = s.get(f"wander_{name}", 0.0)
-        c[name] = c[name] + s.get(f"bias_{name}", 0.0) + wander * (1.0 + 0.4 * np.sin(2.0 * math.pi * t / 55.0))
+        c[name] = c[name] + s.get(f"bias_{name}", 0.0) + wander * (1.0 + 0.15 * np.sin(2.0 * math.pi * t / 55.0))
     c |= {"thrust_left": seen[:, pl.TL], "thrust_right": seen[:, pl.TR], "pressure": geopotential_pressure(Y[:, pl.H])}
     rpm = PUBLISHED["propeller_rpm"]
     c |= {f"torque_{side}": Y[:, column] * 30.0 / (math.pi * rpm) for side, column in

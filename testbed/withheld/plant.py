@@ -100,7 +100,7 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     right = smooth(max(ar - p.alpha_stall, -ar - p.alpha_stall_negative) / p.stall_width)
     share = 0.5 * (left + right)
     plate = -sa / (0.283 + 0.222 * abs(sa))
-    lift = p.CZ_0 + p.CZ_alpha * a + bounded(p.CZ_alpha_soft, a, 0.20)
+    lift = p.CZ_0 + p.CZ_alpha * a + bounded(p.CZ_alpha_soft, a, 0.35)
     zl = (1.0 - left) * lift + left * plate
     zr = (1.0 - right) * (lift + p.CZ_alpha_right * a) + right * plate
     axial = a * (p.CX_alpha + p.CX_alpha2 * a)
@@ -119,10 +119,10 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     tail = smooth((-at - p.alpha_tail_stall) / p.tail_stall_width)
     lagging = p.chord / (2.0 * p.tail_arm)
     cm = (p.Cm_0 + p.Cm_alpha * ((1.0 - share) * a + share * p.Cm_alpha_separated * sa)
-          + bounded(p.Cm_alpha_soft, a, 0.20) + bounded(p.Cm_q_soft, qh, 0.004)
+          + bounded(p.Cm_alpha_soft, a, 0.35) + bounded(p.Cm_q_soft, qh, 0.008)
           + (p.Cm_q - p.Cm_alphadot) * qh + p.Cm_alphadot * lagging * (a - y[ADW])
           + p.Cm_downwash2 * (lagging * (a - y[ADW2]) - 2.0 * qh) + p.Cm_alpha_tail * arrival
-          + (p.Cm_elevator * de + bounded(p.Cm_elevator_soft, de, 0.12)) * (1.0 + p.Cm_elevator_CT * ct)
+          + (p.Cm_elevator * de + bounded(p.Cm_elevator_soft, de, 0.2)) * (1.0 + p.Cm_elevator_CT * ct)
           * (1.0 - p.tail_stall_elevator_loss * tail)
           + p.Cm_CT * ct + p.Cm_ct2 * (ct + 6.0 * ct * ct) - tail * p.Cm_alpha_tail * (at + p.alpha_tail_stall)
           + p.Cm_at_72 * fast + p.Cm_aileron * da + p.Cm_beta2 * b * b + p.Cm_alpha3 * (a - 0.03) ** 3
@@ -131,14 +131,14 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     # lateral
     loss = 1.0 - p.damping_separated * share
     fin = 1.0 + p.fin_ct * ct
-    cy = (p.CY_0 + p.CY_beta * b + bounded(p.CY_beta_soft, b, 0.12) + p.CY_p * ph + p.CY_r * rh
+    cy = (p.CY_0 + p.CY_beta * b + bounded(p.CY_beta_soft, b, 0.25) + p.CY_p * ph + p.CY_r * rh
           + (p.CY_rudder + p.CY_alpha_rudder * (a - 0.03)) * dr)  # fmt: skip
-    cl = (p.Cl_0 + p.Cl_alpha * a + p.Cl_beta * b + bounded(p.Cl_beta_soft, b, 0.12) + p.Cl_r * rh + p.Cl_rudder * dr
-          + loss * (p.Cl_p * ph + bounded(p.Cl_p_soft, ph, 0.06) + p.Cl_aileron * da
-                    + bounded(p.Cl_aileron_soft, da, 0.16))
+    cl = (p.Cl_0 + p.Cl_alpha * a + p.Cl_beta * b + bounded(p.Cl_beta_soft, b, 0.25) + p.Cl_r * rh + p.Cl_rudder * dr
+          + loss * (p.Cl_p * ph + bounded(p.Cl_p_soft, ph, 0.1) + p.Cl_aileron * da
+                    + bounded(p.Cl_aileron_soft, da, 0.3))
           + p.lift_arm * 0.5 * (zr - zl) + p.Cl_at_72 * fast + p.Cl_torque * ct)  # fmt: skip
-    cn = (p.Cn_0 + fin * (p.Cn_beta * b + p.Cn_rudder * dr) + bounded(p.Cn_beta_soft, b, 0.12) + p.Cn_p * ph
-          + p.Cn_r * rh + p.Cn_aileron * da + bounded(p.Cn_rudder_soft, dr, 0.12) - p.lift_arm * 0.5 * (xr - xl)
+    cn = (p.Cn_0 + fin * (p.Cn_beta * b + p.Cn_rudder * dr) + bounded(p.Cn_beta_soft, b, 0.25) + p.Cn_p * ph
+          + p.Cn_r * rh + p.Cn_aileron * da + bounded(p.Cn_rudder_soft, dr, 0.25) - p.lift_arm * 0.5 * (xr - xl)
           + p.Cn_betadot * (b - y[BLAG]) / 0.1 * p.span / (2.0 * V_) + p.Cn_pfactor * a * ct
           + p.Cn_alpha_aileron * a * da)  # fmt: skip
 

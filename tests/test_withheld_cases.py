@@ -1,0 +1,123 @@
+"""Sealed cases: nulls are null, effects act, names carry nothing, hashes tell, an interruption costs nothing."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from icing_env import record
+from testbed.withheld import draw, effects, files, flights, generate, separation, unknown
+from testbed.withheld.manoeuvres import PLANS
+from testbed.withheld.numbers import airframe
+
+NULL = draw.Design("null", (), 0, 1.0, 0.5, 1.3, 1.0, {}, 7)
+
+
+@pytest.fixture(scope="module")
+def shape() -> separation.Geometry:
+    return separation.geometry(0, 1.0, 0.5, 1.3, 1.0)
+
+
+@pytest.fixture
+def only_nulls(monkeypatch):
+    monkeypatch.setattr(draw, "SHARES", {"null": 1.0})
+
+
+def test_tiers_gusts_forms_and_effects_are_all_drawn():
+    drawn = draw.designs(2400, 1)
+    tiers = {t: [d for d in drawn if d.tier == t] for t in draw.SHARES}
+    assert len(tiers["null"]) >= 900 and len(tiers["single"]) >= 900
+    for chosen in tiers.values():
+        counts = [sum(d.sigma == s for d in chosen) for s in draw.SIGMAS]
+        assert max(counts) - min(counts) <= 1
+    assert {d.parts[0][0] for d in tiers["single"]} == {e.name for e in effects.EFFECTS}
+    assert {d.parts[0][0] for d in tiers["unknown"]} == {e.name for e in unknown.UNKNOWN}
+    assert len(unknown.UNKNOWN) >= 12
+    other = np.mean([d.parts[0][1] == "other" for d in tiers["single"]])
+    assert 0.45 < other < 0.55
+    spread = np.array([d.baseline["Cm_alpha"] for d in drawn])
+    assert abs(spread.mean() - 1.0) < 0.005 and 0.045 < spread.std() < 0.055
+
+
+def test_a_seed_draws_the_same_cases_and_another_one_others():
+    assert draw.designs(20, 5) == draw.designs(20, 5)
+    assert draw.designs(20, 5) != draw.designs(20, 6)
+
+
+def test_a_case_without_effects_is_the_published_aircraft_and_its_spread():
+    texts, key = generate.make_case("a", NULL, None)
+    assert flights.Aircraft().row().tobytes() == airframe().tobytes()
+    assert flights.Aircraft().instruments() == {}
+    assert key["effects"] == [] and key["D_none"] == 0.0 and key["where"] == []
+    spread = replace(NULL, baseline={"Cm_alpha": 1.05})
+    row = flights.Aircraft(spread.baseline).row()
+    assert {n for n in row.dtype.names if row[n] != airframe()[n]} == {"Cm_alpha"}
+    assert len(texts) == 2 * len(PLANS[0])
+
+
+@pytest.mark.parametrize("pool", [effects.EFFECTS, unknown.UNKNOWN], ids=["library", "unknown"])
+def test_every_effect_does_something_in_each_of_its_forms(pool, shape):
+    for effect in pool:
+        for form in ("same", "other") if effect.same is not effect.other else ("same",):
+            size = min(1.8 * effect.typical, draw.MOST.get(effect.name, np.inf))
+            found = separation.distances(0, 1.0, shape, ((effect.name, form, size),))
+            assert found.none > 0.5, (effect.name, form)
+            if form == "same" and effect.name in found.rivals:
+                assert found.rivals[effect.name] < 0.1 * found.none + 0.2, effect.name
+
+
+def test_forms_called_other_are_other():
+    for effect in effects.EFFECTS:
+        assert effect.same(effect.typical) != effect.other(effect.typical), effect.name
+
+
+def test_records_are_read_and_carry_no_label(tmp_path):
+    hidden = replace(NULL, tier="unknown", parts=(("fuel_slosh", "same", 200.0),))
+    texts, key = generate.make_case("0a1b", hidden, None)
+    plain, _ = generate.make_case("0a1b", NULL, None)
+    assert {n: t for n, t in texts.items() if n.endswith(".toml")} == {
+        n: t for n, t in plain.items() if n.endswith(".toml")}  # fmt: skip
+    words = {*flights.CATALOGUE, *draw.SHARES, "same", "other", "sigma", key["salt"]}
+    for name, text in texts.items():
+        assert not [word for word in words if word in text or word in name]
+        assert text.splitlines()[0] == plain[name].splitlines()[0]
+    files.write_case(tmp_path / "0a1b", texts)
+    read = [record.read(path) for path in sorted((tmp_path / "0a1b").glob("*.csv"))]
+    assert [r.meta.role for r in read] == ["diagnose"] * 3 + ["held_out"] * 2
+    assert read[0].meta.mass == 4951.0 and len(read[0]) == 2001
+
+
+def test_names_of_a_sealed_set_are_random_and_in_no_order(tmp_path, only_nulls):
+    first, _ = generate._roll(tmp_path / "a.json", 40, None)
+    second, _ = generate._roll(tmp_path / "b.json", 40, None)
+    assert not set(first) & set(second)
+    assert first != sorted(first)
+    assert generate._roll(tmp_path / "a.json", 40, None)[0] == first
+    with pytest.raises(ValueError, match="another seed"):
+        generate._roll(tmp_path / "a.json", 41, None)
+
+
+def test_an_interrupted_draw_goes_on_and_tampering_is_told(tmp_path, only_nulls):
+    def stop(text: str) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        generate.generate(tmp_path, 3, 11, progress=stop)
+    made = sorted(p.name for p in (tmp_path / "records").iterdir())
+    assert 0 < len(made) < 3 and not (tmp_path / "manifest.json").exists()
+    before = {n: (tmp_path / "records" / n / "1.csv").stat().st_mtime_ns for n in made}
+    sealed = generate.generate(tmp_path, 3, 11)
+    assert {n: (tmp_path / "records" / n / "1.csv").stat().st_mtime_ns for n in made} == before
+    assert len(sealed["cases"]) == 3
+    check = tmp_path / "records", tmp_path / "keys", sealed
+    assert files.tampered(*check) == []
+    one, two, three = sorted(sealed["cases"])
+    key = tmp_path / "keys" / f"{one}.json"
+    key.write_text(json.dumps(json.loads(key.read_text()) | {"tier": "single"}))
+    csv = tmp_path / "records" / two / "4.csv"
+    csv.write_text(csv.read_text().replace("0.0", "0.1", 1) + "\n")
+    (tmp_path / "records" / three / "2.toml").unlink()
+    assert files.tampered(*check) == [one, two, three]

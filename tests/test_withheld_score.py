@@ -1,0 +1,132 @@
+"""The scorer: right answers score right, dealt answers at chance, classes count only where they are true."""
+
+from __future__ import annotations
+
+import ast
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from testbed import diagnosis_benchmark as run
+from testbed.withheld import files, score
+
+NAMES = [f"effect_{i}" for i in range(20)]
+
+
+def key(tier: str, parts: list[str], sigma: float, none: float = 20.0, pair: float = 10.0, **changes) -> dict:
+    return {"tier": tier, "sigma_w": sigma, "effects": parts, "forms": ["same"] * len(parts), "D_none": none,
+            "parameters": {n: {"size": 1.0} for n in parts}, "where": [f"place_{n}" for n in parts], "D_pair": pair,
+            "D": {n: 0.0 if n in parts else 15.0 for n in NAMES}, "salt": "x"} | changes  # fmt: skip
+
+
+def answer(parts: list[str], unknown: bool = False, p: float = 0.97, near: tuple[str, ...] = ()) -> dict:
+    hypotheses = [{"effects": parts, "unknown": unknown, "probability": p},
+                  {"effects": [], "unknown": not unknown, "probability": 1.0 - p}]
+    told = {"size": {"estimate": 1.0, "low95": 0.9, "high95": 1.1, "unit": "1"}}
+    return {"verdict": "explained" if parts else "unknown" if unknown else "no_gap", "hypotheses": hypotheses,
+            "credible_set_95": [0], "where": {"components": {f"place_{n}": p for n in parts}}, "seconds": 2.0,
+            "effects": [{"name": n, "probability": p, "indistinguishable_from": list(near), "parameters": told}
+                        for n in parts], "gap": {"held_out": {"closure": 0.9 if parts else None}}}  # fmt: skip
+
+
+def write(folder: Path, pairs: list[tuple[dict, dict]]) -> tuple[Path, Path]:
+    for part in ("answers", "keys"):
+        (folder / part).mkdir()
+    for i, (told, true) in enumerate(pairs):
+        (folder / "answers" / f"c{i:03}.json").write_text(json.dumps(told))
+        (folder / "keys" / f"c{i:03}.json").write_text(json.dumps(true))
+    return folder / "answers", folder / "keys"
+
+
+@pytest.fixture
+def perfect(tmp_path) -> tuple[Path, Path]:
+    pairs = []
+    for i in range(120):
+        sigma, name, second = (0.0, 0.5, 1.5)[i % 3], NAMES[i % 20], NAMES[(i + 7) % 20]
+        tier = ("null", "single", "single", "pair", "unknown")[(i // 3) % 5]
+        parts = {"null": [], "unknown": ["never"], "single": [name], "pair": [name, second]}[tier]
+        told = [] if tier == "unknown" else parts
+        pairs.append((answer(told, tier == "unknown"), key(tier, parts, sigma)))
+    return write(tmp_path, pairs)
+
+
+def test_right_answers_score_right(perfect):
+    found = score.score(*perfect)
+    for name in ("top1", "top3", "pair_exact_set", "unknown_auroc_above_8", "where_f1", "coverage95",
+                 "mean_set_size", "parameter_coverage95", "unknown_tpr_at_5_fpr"):  # fmt: skip
+        assert found[name] == 1.0, name
+    assert found["null_false_alarm"] == 0.0 and found["closure_median"] == 0.9 and found["seconds_per_case"] == 2.0
+    assert found["top1_by_gust"] == {"0": 1.0, "0.5": 1.0, "1.5": 1.0}
+    assert found["unknown_auroc_5_to_8"] is None and found["oracle_fraction"] is None
+    assert found["intervals95"]["top1"] == [1.0, 1.0]
+    assert {"cases", "top1", "by_tier", "mismatched_form", "baselines", "ece"} <= set(found)
+
+
+def test_permuted_keys_score_at_chance(perfect):
+    dealt = score.score(*perfect)["baselines"]["permuted_keys"]
+    assert dealt["top1"] < 0.2  # a twentieth of the effects, and only where a single meets a single
+    assert abs(dealt["unknown_auroc_above_8"] - 0.5) < 0.2
+    assert dealt["null_false_alarm"] > 0.6
+    silent = score.score(*perfect)["baselines"]["always_no_gap"]
+    assert silent["top1"] == 0.0 and silent["null_false_alarm"] == 0.0
+
+
+def test_a_class_counts_only_where_every_member_is_truly_near():
+    told = answer(["effect_1"], near=("effect_2", "effect_3"))
+    near = {n: 2.0 if n in ("effect_1", "effect_2", "effect_3") else 15.0 for n in NAMES} | {"effect_2": 0.0}
+    assert score.flat(told, key("single", ["effect_2"], 0.0, D=near))["top1"]
+    assert not score.flat(told, key("single", ["effect_2"], 0.0, D=near | {"effect_3": 4.0}))["top1"]
+    assert not score.flat(told, key("single", ["effect_4"], 0.0, D=near))["top1"]
+
+
+def test_identifiable_means_that_the_own_name_is_nearest():
+    assert score.identifiable(key("single", ["effect_1"], 0.0))
+    assert not score.identifiable(key("single", ["effect_1"], 0.0, none=5.0))
+    bent = dict.fromkeys(NAMES, 30.0) | {"effect_1": 29.8}
+    assert not score.identifiable(key("single", ["effect_1"], 0.0, none=40.0, D=bent))
+
+
+def test_a_refused_record_is_wrong_and_counted():
+    case = score.flat({"error": "no"}, key("null", [], 0.0))
+    assert case["alarm"] and case["failed"] and not case["top3"] and not case["covered"]
+
+
+def test_calibration_and_auroc_against_numbers_worked_out_by_hand():
+    assert score.auroc([2.0, 3.0], [1.0, 2.0]) == pytest.approx(0.875)
+    rng = np.random.default_rng(1)
+    p = rng.uniform(0.05, 0.95, 30_000)
+    cases = [{"inclusion": list(zip(p, rng.random(len(p)) < p, strict=True))}]
+    assert score.calibration_error(cases) < 0.02
+    assert score.calibration_error([{"inclusion": [(0.9, False)] * 100}]) == pytest.approx(0.9)
+
+
+def test_the_scorer_imports_nothing_but_json_and_numpy():
+    tree = ast.parse(Path(score.__file__).read_text())
+    names = {n.module if isinstance(n, ast.ImportFrom) else a.name for n in ast.walk(tree)
+             if isinstance(n, ast.Import | ast.ImportFrom) for a in n.names}  # fmt: skip
+    assert names <= {"__future__", "json", "math", "sys", "collections.abc", "pathlib", "typing", "numpy"}
+
+
+def test_a_killed_run_goes_on_with_the_answers_it_has(perfect, tmp_path):
+    names = [p.stem for p in sorted(perfect[0].iterdir())]
+    for name in names:
+        files.write_case(tmp_path / "records" / name, {"1.csv": "time\n0\n"})
+    sealed = files.manifest(tmp_path / "records", tmp_path / "keys", names) | {"count": len(names)}
+    files.write_text(tmp_path / "manifest.json", json.dumps(sealed))
+    (tmp_path / "keys").chmod(0)  # as a kill leaves it
+    said: list[str] = []
+    found = run.measure(tmp_path, len(names), 0, 1, said.append)
+    assert found["top1"] == 1.0 and found["set"] == "development" and said == ["scoring"]
+    ledger = tmp_path / "ledger.csv"
+    for _ in range(2):
+        run.enter_ledger(ledger, found, tmp_path)
+    lines = ledger.read_text().splitlines()
+    assert len(lines) == 3 and lines[0].startswith("date,set,cases")
+    assert run.tables(found)[0][2][0][1] == "120"
+    with pytest.raises(run.InputError, match="holds a set of 120 cases"):
+        run.measure(tmp_path, 5, 0, 1, said.append)
+    (tmp_path / "keys" / f"{names[0]}.json").write_text("{}")
+    with pytest.raises(run.InputError, match="not those of the manifest"):
+        run.measure(tmp_path, len(names), 0, 1, said.append)
