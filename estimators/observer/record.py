@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from estimators.estimate import Estimate
 from estimators.observer.layout import CHANNELS, COUNT, FIRST, PARAMETER_NAMES, SEEN_NAMES
 from estimators.observer.learned import History, learned, noise_of
 from estimators.observer.measurements import absent, airframe_of_record, measurements
-from estimators.regression.equations import DOWNWASH, EXCITED, LARGEST_RATIO, SURFACES, movement
+from estimators.regression.equations import EXCITED, LARGEST_RATIO, LEFT_OUT, SURFACES, movement
 from estimators.signals.coefficients import thrust
 from estimators.signals.data_checks import check
 from estimators.signals.gust_level import turbulence_warnings
@@ -25,6 +25,8 @@ AXIS = dict(zip(CHANNELS, ("longitudinal",) * 3 + ("lateral",) * 3, strict=True)
 EXTRAPOLATED = 0.2  # lift coefficient: nearest a record must come to zero lift for CD_0 to be its own (assumed)
 STARTS = (0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6)  # of the clean aircraft: seven, as in the paper's Figs. 23-26 (assumed)
 FAR = (STARTS[0], STARTS[-1])
+# As LEFT_OUT, of recursions with errors by least squares; more of what moves with alpha, whose lag they see as slower.
+SLOWLY = LEFT_OUT | {"CL_elevator": 0.1, "CY_beta": 0.011, "CY_r": 0.025, "CY_rudder": 0.025, "Cl_rudder": 0.02}
 CONVERGED = 0.1  # largest share of the spread of the starts that may be left at the end (assumed; "a small fraction")
 
 
@@ -34,7 +36,8 @@ class Method:
 
     `init(airframe, tuning, n, start) -> memory` and `step(memory, estimate, measurement, airframe, tuning, dt)`, in
     place, n aircraft at once. `kept`: fields of its memory that a `History` keeps. `own_errors`: take standard errors
-    from the method's own `deviation`; else they are those of least squares on the rows it learned from.
+    from the method's own `deviation`; else they are those of least squares on the rows it learned from. `left_out`:
+    error beside that, as a share of a derivative.
     """
 
     name: str
@@ -43,6 +46,7 @@ class Method:
     default_tuning: Callable[[], NDArray[np.void]]
     kept: tuple[str, ...] = SEEN_NAMES
     own_errors: bool = False
+    left_out: Mapping[str, float] = field(default_factory=lambda: SLOWLY)
 
 
 def histories(
@@ -129,7 +133,7 @@ def identify(
                 value, name = float(run.memory["theta"][-1, i]), PARAMETER_NAMES[i]
                 if not method.own_errors:
                     value += put_back[i - FIRST[c]]
-                    error = float(np.hypot(error, DOWNWASH.get(name, 0.0) * value))
+                error = float(np.hypot(error, method.left_out.get(name, 0.0) * value))
                 why = _why_not(name, channel, moved) or _why_not_converged(run, far, i, len(grid.time))
                 if not why and not name.endswith("_0") and not error <= LARGEST_RATIO * abs(value):
                     why = f"its standard error {error:.2g} exceeds a third of the estimate {value:.2g}"

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from estimators.estimate import Estimate
 from estimators.regression.equations import (
-    DOWNWASH,
     EQUATIONS,
     EXCITED,
+    LEFT_OUT,
     NEEDED,
     SURFACES,
     Equation,
@@ -74,7 +74,7 @@ class Problem:
 
     def _misfit(self, name: str) -> float:
         """Share of a derivative that the equation itself may be wrong by, where noise is allowed for as well."""
-        return DOWNWASH.get(name, 0.0) if self.noise else 0.0
+        return LEFT_OUT.get(name, 0.0) if self.noise else 0.0
 
     def flown(self, equation: Equation) -> bool:
         """Whether a surface of the equation's axis moved: without it products of noise and drift would compete."""
