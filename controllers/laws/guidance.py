@@ -54,7 +54,7 @@ GUIDANCE_GAINS_FIELDS: list[Field] = [
     ("airspeed_bandwidth", "rad/s", "bandwidth of the air-inertial filter"),
     ("K_airspeed", "s/m", "throttle per airspeed error"),
     ("K_airspeed_integral", "1/m", "throttle rate per airspeed error"),
-    ("airspeed_gust", "m/s", "airspeed error that gusts make: the levers at a stop for it do not hold the integral"),
+    ("airspeed_gust", "m/s", "lack of airspeed that gusts make: full power for it does not hold the integral"),
     ("K_throttle_climb", "s/m", "throttle per climb-rate command"),
     ("K_speed_priority", "1", "climb rate allowed per airspeed above the limit"),
     ("K_heading", "1/s", "turn rate per heading error"),
@@ -169,14 +169,14 @@ def pitch_command(a: Any, m: Any, t: Any, adv: Any, g: Any, climb: float, scale:
 def hold_airspeed(a: Any, c: Any, m: Any, t: Any, adv: Any, g: Any, climb: float, dt: float) -> None:
     """Both power levers.
 
-    The integral is held at a stop to which it, the climb and more than a gust's error have brought the levers, not
+    The integral is held at full power to which it, the climb and more than a gust's error have brought the levers, not
     where gusts take them there: an aircraft that needs much of its power would settle below its speed.
     """
     wanted = t.throttle
     if t.speed_mode == 1.0:
         error = max(t.airspeed, adv.airspeed_limit + g.airspeed_margin) - a.airspeed
         wanted = a.throttle_trim + g.K_airspeed*error + g.K_throttle_climb*climb
-        held = wanted - g.K_airspeed*clip(error, -g.airspeed_gust, g.airspeed_gust)
+        held = wanted - g.K_airspeed*clip(error, 0.0, g.airspeed_gust)
         rate = g.K_airspeed_integral*error*dt
         a.throttle_trim = integrated(a.throttle_trim, rate, held, g.throttle_min, g.throttle_max)
     else:

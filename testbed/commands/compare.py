@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import click
 
 from testbed.commands.common import print_json, print_table, verb
 
+WIDTH = 100  # columns of a terminal
 
 @verb("compare", "icing compare --quick\nicing compare --controllers autopilot,hands_off --episodes 8 --out report")
 @click.option("--suite", default="standard", show_default=True, help="A name under configs/suites, or a .toml's path.")
@@ -44,22 +46,36 @@ def command(suite: str, quick: bool, controllers: str | None, episodes: int | No
 
 
 def _overview(result: dict[str, Any]) -> None:
-    """A table per function over all cases, then what follows."""
-    from testbed.comparison.overview import FUNCTIONS, names_of, overview, sentences
+    """Tables per function over all cases, as many as it takes to keep to WIDTH, then what follows."""
+    from testbed.comparison.overview import FUNCTIONS, heading, overview, sentences, told
 
     rows = result["rows"]
     seen = overview(rows)
+    click.echo(f"suite {result['suite']}, {seen[0]['cases']} cases of {result['episodes']} episodes; mean and half of "
+               "the 95 % interval")
+    who = [[one["controller"], "on" if one["protection"] else "off"] for one in seen]
     for function, title in FUNCTIONS.items():
-        names = names_of(rows, function)
-        units = {n: rows[0]["metrics"][n]["unit"] for n in names}
-        headers = {"controller": "left", "prot.": "left"}
-        headers |= {n.replace("_", " ") + ("" if units[n] == "1" else f" ({units[n]})"): "right" for n in names}
-        print_table(f"{title} (suite {result['suite']}, {seen[0]['cases']} cases of {result['episodes']} episodes; "
-                    "mean and half of the 95 % interval)", headers,
-                    [[one["controller"], "on" if one["protection"] else "off",
-                      *(_cell(*one["metrics"][n]) for n in names)] for one in seen])
+        columns = [["\n".join(heading(rows, n).split(maxsplit=2)), *(_cell(*one["metrics"][n]) for one in seen)]
+                   for n in told(rows, function)]
+        for part in _fitting(columns, WIDTH - max(len(name) for name, _ in who) - len("  prot.")):
+            print_table(f"\n{title}", {"controller": "left", "prot.": "left", **{head: "right" for head, *_ in part}},
+                        [[*names, *cells] for names, *cells in zip(who, *(cells for _, *cells in part), strict=True)])
     for text, _ in sentences(rows):
-        click.echo(text)
+        click.echo(textwrap.fill(text, WIDTH))
+
+
+def _fitting(columns: list[list[str]], room: int) -> list[list[list[str]]]:
+    """Columns, each a heading and its cells, in groups that are at most `room` characters wide (one at least)."""
+    groups: list[list[list[str]]] = []
+    used = 0
+    for column in columns:
+        width = 2 + max(len(line) for text in column for line in text.splitlines())
+        if not groups or used + width > room:
+            groups.append([])
+            used = 0
+        groups[-1].append(column)
+        used += width
+    return groups
 
 
 def _cell(mean: float | None, half: float | None) -> str:

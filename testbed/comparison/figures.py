@@ -9,11 +9,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from controllers.policies.files import find, read
-from testbed.comparison.overview import Rows
+from testbed.comparison.overview import Rows, heading
 from testbed.flight import controller
 from testbed.plot_style import GREY, ROLES, legend_above, styled
 
 COLUMNS = 4
+SIGNED = ("worst_alpha_margin",)  # metrics that can be negative: intervals of the others are shown from 0 on
 SHOWN = {True: ("protected", "o"), False: ("unprotected", "D")}  # role and marker
 
 
@@ -38,7 +39,8 @@ def by_case(rows: Rows, name: str) -> Figure:
                 continue
             role, marker = SHOWN[row["protection"]]
             y = place[row["controller"]] + (-0.17 if row["protection"] else 0.17)
-            spread = np.array([[metric["mean"] - metric["low95"]], [metric["high95"] - metric["mean"]]])
+            low = metric["low95"] if name in SIGNED else max(metric["low95"], 0.0)
+            spread = np.array([[metric["mean"] - low], [metric["high95"] - metric["mean"]]])
             axes.errorbar([metric["mean"]], [y], xerr=np.maximum(spread, 0.0), fmt=marker, markersize=3.5,
                           color=ROLES[role]["color"], linewidth=1.0, label=role)
         for k in range(1, len(order)):
@@ -49,8 +51,9 @@ def by_case(rows: Rows, name: str) -> Figure:
         axes.set_ylim(len(order) - 0.5, -0.5)
     for axes in panels[len(cases):]:
         axes.set_visible(False)
-    unit = rows[0]["metrics"][name]["unit"]
-    figure.supxlabel(name.replace("_", " ") + ("" if unit == "1" else f" ({unit})"), fontsize=9.5)
+    for axes in panels[max(len(cases) - columns, 0):len(cases)]:
+        axes.tick_params(labelbottom=True)  # the lowest of its column
+    figure.supxlabel(heading(rows, name), fontsize=9.5)
     legend_above(figure, panels[:len(cases)])
     return figure
 

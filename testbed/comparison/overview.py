@@ -9,6 +9,9 @@ from typing import Any
 Rows = list[dict[str, Any]]
 FUNCTIONS = {1: "1 sense ice", 2: "2 operate ice protection", 3: "3 protect the envelope", 4: "4 fly well"}
 SAFETY = ("stalled", "losses")  # a controller is as safe as another if neither share is larger
+SHARES = {**dict.fromkeys(("exceedances", "intervention_time", "nuisance_time"), " (share of time)"),
+          **dict.fromkeys(("missed_alarms", "stalled", "losses", "upsets", "level_lost"), " (share of episodes)"),
+          **dict.fromkeys(("altitude_overshoot", "heading_overshoot"), " (share of step)")}  # of metrics without a unit
 STATED = "altitude_rms"  # the figure by which learned and classical controllers are ranked
 
 
@@ -17,13 +20,24 @@ def names_of(rows: Rows, function: int) -> list[str]:
     return [name for name, m in rows[0]["metrics"].items() if m["ims_function"] == function]
 
 
+def told(rows: Rows, function: int) -> list[str]:
+    """Metrics of a function that have a value in some row, in order."""
+    return [name for name in names_of(rows, function) if any(row["metrics"][name]["mean"] is not None for row in rows)]
+
+
+def heading(rows: Rows, name: str) -> str:
+    """A metric's name with its unit, or what it is a share of."""
+    unit = rows[0]["metrics"][name]["unit"]
+    return f"{name.replace('_', ' ')} ({unit})" if unit != "1" else name.replace("_", " ") + SHARES.get(name, "")
+
+
 def pooled(metrics: Iterable[Mapping[str, Any]]) -> tuple[float | None, float | None]:
     """Mean over cases and half its 95 % interval, from each case's own (cases are given, only episodes are drawn)."""
-    told = [m for m in metrics if m["mean"] is not None]
-    if not told:
+    there = [m for m in metrics if m["mean"] is not None]
+    if not there:
         return None, None
-    halves = [0.5*(m["high95"] - m["low95"]) for m in told]
-    return sum(m["mean"] for m in told)/len(told), math.sqrt(sum(h*h for h in halves))/len(told)
+    halves = [0.5*(m["high95"] - m["low95"]) for m in there]
+    return sum(m["mean"] for m in there)/len(there), math.sqrt(sum(h*h for h in halves))/len(there)
 
 
 def overview(rows: Rows) -> list[dict[str, Any]]:
@@ -54,23 +68,28 @@ def _protection(seen: list[dict[str, Any]]) -> list[tuple[str, str]]:
                   for on in (True, False)}
         if not shares[True] or not shares[False]:
             continue
-        spans = {on: f"{min(told.values()):.1f} to {max(told.values()):.1f} %" for on, told in shares.items()}
+        spans = {on: _span(list(by.values())) for on, by in shares.items()}
         worse = ", ".join(name for name, value in shares[True].items() if value > 1.0)
         text = f"Episodes {what}, over all controllers: {spans[True]} protected, {spans[False]} unprotected"
         out.append((f"{text}{f'; above 1 % protected: {worse}' if worse else ''}.", "caution" if worse else "good"))
     return out
 
 
+def _span(values: list[float]) -> str:
+    low, high = f"{min(values):.1f}", f"{max(values):.1f}"
+    return f"{low} %" if low == high else f"{low} to {high} %"
+
+
 def _nuisance(rows: Rows) -> list[tuple[str, str]]:
     clear = [row for row in rows if row["protection"] and row["scenario"] in ("clear_air", "steps_clean")]
-    told: dict[str, float] = {}
+    by: dict[str, float] = {}
     for row in clear:
-        told[row["controller"]] = max(told.get(row["controller"], 0.0), row["metrics"]["nuisance_time"]["mean"] or 0.0)
-    if not told:
+        by[row["controller"]] = max(by.get(row["controller"], 0.0), row["metrics"]["nuisance_time"]["mean"] or 0.0)
+    if not by:
         return []
-    worst = max(told, key=lambda name: told[name])
-    return [(f"Nuisance interventions in clear air: at most {100*told[worst]:.2f} % of the time ({worst}).",
-             "good" if told[worst] <= 0.001 else "bad")]
+    worst = max(by, key=lambda name: by[name])
+    most = f"at most {100*by[worst]:.2f} % of the time ({worst})" if by[worst] > 0.0 else "none"
+    return [(f"Nuisance interventions in clear air: {most}.", "good" if by[worst] <= 0.001 else "bad")]
 
 
 def _learned(seen: list[dict[str, Any]]) -> tuple[str, str]:

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from testbed.comparison.figures import by_case, learning_curves
-from testbed.comparison.overview import FUNCTIONS, Rows, names_of, overview, sentences
+from testbed.comparison.figures import SIGNED, by_case, learning_curves
+from testbed.comparison.overview import FUNCTIONS, Rows, heading, overview, sentences, told
 from testbed.files import write_whole
 from testbed.report import Cell, Report
 
@@ -20,6 +20,7 @@ with the interquartile mean beside. Truth is used for scores only.
 KEY = {1: ("detection_delay", "severity_error"), 2: ("ice_carried", "boot_cycles"),
        3: ("losses", "stalled", "exceedances", "worst_alpha_margin"),
        4: ("altitude_rms", "heading_rms", "short_period_off", "elevator_activity")}  # fmt: skip
+COLUMNS, NO_BREAK = 3, "\u00a0"
 
 
 def write(result: Mapping[str, Any], provenance: Mapping[str, str], folder: Path) -> Path:
@@ -43,29 +44,37 @@ def write(result: Mapping[str, Any], provenance: Mapping[str, str], folder: Path
 
 
 def _function(report: Report, rows: Rows, function: int, title: str) -> None:
-    names = names_of(rows, function)
+    names = told(rows, function)
     report.section(title[2:].capitalize())
-    report.table(("controller", "kind", "protection", *(_head(rows, n) for n in names)),
-                 [(one["controller"], one["kind"], "on" if one["protection"] else "off",
-                   *(one["metrics"][n][0] for n in names)) for one in overview(rows)],
-                 "Means over all cases.")
+    for part in _parts(names):
+        report.table(("controller", "kind", "protection", *(heading(rows, n) for n in part)),
+                     [(one["controller"], one["kind"], "on" if one["protection"] else "off",
+                       *(_pooled(*one["metrics"][n]) for n in part)) for one in overview(rows)],
+                     "Means over all cases, and half of the 95 % interval.")
     for name in KEY[function]:
-        if any(row["metrics"][name]["mean"] is not None for row in rows):
-            report.figure(by_case(rows, name), f"{_head(rows, name)} by case, with 95 % intervals.",
+        if name in names:
+            label = heading(rows, name)
+            report.figure(by_case(rows, name), f"{label[0].upper()}{label[1:]} by case, with 95 % intervals.",
                           f"{name} of every controller in every case, protected and unprotected")
-    report.table(("scenario", "gusts", "controller", "protection", *(_head(rows, n) for n in names)),
-                 [(row["scenario"], row["turbulence"], row["controller"], "on" if row["protection"] else "off",
-                   *(_cell(row["metrics"][n]) for n in names)) for row in rows
-                  if any(row["metrics"][n]["mean"] is not None for n in names)],
-                 "Every case: mean and, in brackets, the 95 % interval.")
+    for part in _parts(names):
+        there = [row for row in rows if any(row["metrics"][n]["mean"] is not None for n in part)]
+        report.table(("scenario, gusts", "controller", "protection", *(heading(rows, n) for n in part)),
+                     [(f"{row['scenario']}, {row['turbulence']}", row["controller"],
+                       "on" if row["protection"] else "off", *(_cell(n, row["metrics"][n]) for n in part))
+                      for row in there], "Every case: mean and, in brackets, the 95 % interval.")
 
 
-def _head(rows: Rows, name: str) -> str:
-    unit = rows[0]["metrics"][name]["unit"]
-    return name.replace("_", " ") + ("" if unit == "1" else f" ({unit})")
+def _parts(names: list[str]) -> list[list[str]]:
+    """Columns that fit beside one another on the page."""
+    return [names[k:k + COLUMNS] for k in range(0, len(names), COLUMNS)]
 
 
-def _cell(metric: Mapping[str, Any]) -> Cell:
+def _pooled(mean: float | None, half: float | None) -> Cell:
+    return None if mean is None else f"{mean:.3g}{NO_BREAK}±{NO_BREAK}{half:.2g}"
+
+
+def _cell(name: str, metric: Mapping[str, Any]) -> Cell:
     if metric["mean"] is None:
         return None
-    return f"{metric['mean']:.3g} ({metric['low95']:.2g} to {metric['high95']:.2g})"
+    low = metric["low95"] if name in SIGNED else max(metric["low95"], 0.0)
+    return f"{metric['mean']:.3g} ({low:.2g} to {metric['high95']:.2g})".replace(" ", NO_BREAK)
