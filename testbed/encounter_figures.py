@@ -110,13 +110,13 @@ def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[s
         return f"{100*value['mean']:.2f} ({max(100*value['low95'], 0.0):.1f}-{100*value['high95']:.1f})"
 
     columns = ("stalled", "departed", "exceedances", "interventions")
-    headers = {"scenario": "left", "protection": "left", **{f"{c}, %": "right" for c in columns},
-               "worst margin, rad": "right"}
+    headers = {"scenario": "left", "protection": "left", **dict.fromkeys(columns, "right"), "margin": "right"}
     rows = [[r["scenario"], r["protection"], *(percent(r[c]) for c in columns), f"{r['worst_margin']:.3f}"]
             for r in found["rows"]]
     cost = [[name, f"{us['median']:.1f}", f"{us['p99']:.1f}"] for name, us in found["filter_us"].items()]
     speed = found["steps_per_s"]
     told = f"observed {speed['observed']:,.0f} steps/s, controlled and protected too {speed['controlled']:,.0f}"
-    return [(f"{found['encounters']} encounters a row, {found['seeds']} seeds, 95 % intervals", headers, rows),
+    return [(f"{found['encounters']} encounters a row, {found['seeds']} seeds,: %, 95 % intervals; margin to the iced stall, rad",
+             headers, rows),
             (f"one call for one aircraft; {told} ({100*speed['ratio']:.0f} %)",
              {"protection": "left", "median, us": "right", "p99, us": "right"}, cost)]

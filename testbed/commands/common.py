@@ -75,11 +75,12 @@ def print_table(title: str, headers: Mapping[str, str], rows: list[list[str]]) -
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    table = Table(box=None, pad_edge=False)
     for heading, side in headers.items():
         table.add_column(heading, justify="right" if side == "right" else "left", overflow="fold")
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))
     console = Console()
     console.width = console.width if console.is_terminal else 120  # a pipe has no width; 80 would fold every row
+    console.print(Text(title, style="italic"))  # a title of the table's own would be folded to the table's width
     console.print(table)

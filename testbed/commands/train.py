@@ -56,9 +56,9 @@ def command(algo: str, name: str | None, scenario: str | None, steps: int | None
         print_json(result)
         return
     last = run.curve[-1]
-    click.echo(f"{run.folder}: {result['steps']} of {result['steps_in_all']} steps; reward {last['reward']:.3f}, "
-               f"altitude {last['altitude_rms']:.2f} m, airspeed {last['airspeed_rms']:.2f} m/s, "
-               f"losses {last['losses']:.3f} on the fixed cases")
+    click.echo(f"{run.folder}: {result['steps']:,} decisions, {result['steps_in_all']:,} asked for; rollouts are whole")
+    click.echo(f"fixed cases: reward {last['reward']:.3f}, altitude {last['altitude_rms']:.2f} m, airspeed "
+               f"{last['airspeed_rms']:.2f} m/s, losses {100*last['losses']:.1f} %")
 
 
 def _learn(run: Any, minutes: float | None) -> bool:
@@ -66,13 +66,14 @@ def _learn(run: Any, minutes: float | None) -> bool:
     if not sys.stderr.isatty():
         return bool(run.learn(minutes))
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    with Progress(TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(),
-                  console=Console(stderr=True)) as bar:
-        task = bar.add_task("reward ...", total=run.order.steps, completed=run.model.num_timesteps)
+    columns = (TextColumn("{task.description}"), BarColumn(20), MofNCompleteColumn(), TextColumn("decisions,"),
+               TimeRemainingColumn(), TextColumn("to go"))
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("until the first point", total=run.order.steps, completed=run.model.num_timesteps)
 
         def show(steps: int, total: int, point: dict[str, float]) -> None:
-            bar.update(task, completed=steps, total=total, description=f"reward {point['reward']:.3f}")
+            bar.update(task, completed=min(steps, total), total=total, description=f"reward {point['reward']:.3f}")
 
         return bool(run.learn(minutes, show))

@@ -58,7 +58,7 @@ def _function(report: Report, rows: Rows, function: int, title: str) -> None:
                           f"{name} of every controller in every case, protected and unprotected")
     for part in _parts(names):
         there = [row for row in rows if any(row["metrics"][n]["mean"] is not None for n in part)]
-        report.table(("scenario, gusts", "controller", "protection", *(heading(rows, n) for n in part)),
+        report.table(("scenario, gusts", "controller", "prot.", *(heading(rows, n) for n in part)),
                      [(f"{row['scenario']}, {row['turbulence']}", row["controller"],
                        "on" if row["protection"] else "off", *(_cell(n, row["metrics"][n]) for n in part))
                       for row in there], "Every case: mean and, in brackets, the 95 % interval.")
@@ -70,11 +70,15 @@ def _parts(names: list[str]) -> list[list[str]]:
 
 
 def _pooled(mean: float | None, half: float | None) -> Cell:
-    return None if mean is None else f"{mean:.3g}{NO_BREAK}±{NO_BREAK}{half:.2g}"
+    return None if mean is None else f"{_number(mean, 3)}{NO_BREAK}±{NO_BREAK}{_number(half or 0.0, 2)}"
 
 
 def _cell(name: str, metric: Mapping[str, Any]) -> Cell:
     if metric["mean"] is None:
         return None
     low = metric["low95"] if name in SIGNED else max(metric["low95"], 0.0)
-    return f"{metric['mean']:.3g} ({low:.2g} to {metric['high95']:.2g})".replace(" ", NO_BREAK)
+    return f"{_number(metric['mean'], 3)} ({_number(low, 2)}{NO_BREAK}to{NO_BREAK}{_number(metric['high95'], 2)})"
+
+
+def _number(value: float, digits: int) -> str:
+    return f"{value:,.0f}" if abs(value) >= 1000.0 else f"{value:.{digits}g}"
