@@ -116,7 +116,7 @@ def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[s
     cost = [[name, f"{us['median']:.1f}", f"{us['p99']:.1f}"] for name, us in found["filter_us"].items()]
     speed = found["steps_per_s"]
     told = f"observed {speed['observed']:,.0f} steps/s, controlled and protected too {speed['controlled']:,.0f}"
-    title = f"{found['encounters']} encounters a row, {found['seeds']} seeds: %, 95 % intervals; margin to the iced stall, rad"
+    title = f"{found['encounters']} encounters a row, {found['seeds']} seeds, %; margin to the iced stall, rad"
     return [(title, headers, rows),
             (f"one call for one aircraft; {told} ({100*speed['ratio']:.0f} %)",
              {"protection": "left", "median, us": "right", "p99, us": "right"}, cost)]
