@@ -1,7 +1,7 @@
 """Dryden turbulence (MIL-F-8785C) by Van Loan's discretisation at the integrator's own 5 ms step.
 
 Above 2000 ft the scale is 1750 ft on all axes and the intensities are equal; `scale` multiplies it. The tail meets
-the vertical gust through the document's Pade approximation: with a true delay, a null at 1.5 m/s is told from the model.
+the gust through the document's Pade approximation: with a true delay, a null at 1.5 m/s is told from the model.
 """
 
 from __future__ import annotations
