@@ -59,8 +59,11 @@ def _drawn(out: Path, cases: int, seed: int | None, workers: int, progress: Prog
         (out / "keys").chmod(OPEN)  # a run that was killed left it closed
     if (out / "manifest.json").is_file():
         committed = read_json(out / "manifest.json")
-        if committed["count"] != cases:
-            raise InputError(f"{out}: holds a set of {committed['count']} cases, not {cases}; give another --out")
+        wanted = None if seed is None else DEVELOPMENT_SEED + seed
+        if committed["count"] != cases or committed["development_seed"] != wanted:
+            kind = "sealed" if committed["development_seed"] is None else "development"
+            raise InputError(f"{out}: holds a {kind} set of {committed['count']} cases, not the one asked for; "
+                             "give another --out")
     else:
         try:
             committed = generate(out, cases, None if seed is None else DEVELOPMENT_SEED + seed, workers, progress)

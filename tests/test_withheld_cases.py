@@ -91,13 +91,16 @@ def test_records_are_read_and_carry_no_label(tmp_path):
 
 
 def test_names_of_a_sealed_set_are_random_and_in_no_order(tmp_path, only_nulls):
-    first, _ = generate._roll(tmp_path / "a.json", 40, None)
-    second, _ = generate._roll(tmp_path / "b.json", 40, None)
+    first, _, known = generate._roll(tmp_path / "a.json", 40, None)
+    second, *_ = generate._roll(tmp_path / "b.json", 40, None)
+    assert not known
     assert not set(first) & set(second)
     assert first != sorted(first)
     assert generate._roll(tmp_path / "a.json", 40, None)[0] == first
     with pytest.raises(ValueError, match="another seed"):
         generate._roll(tmp_path / "a.json", 41, None)
+    with pytest.raises(ValueError, match="another seed"):  # a sealed set is not finished as a development set
+        generate._roll(tmp_path / "a.json", 40, 3)
 
 
 def test_an_interrupted_draw_goes_on_and_tampering_is_told(tmp_path, only_nulls):

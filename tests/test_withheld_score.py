@@ -113,7 +113,8 @@ def test_a_killed_run_goes_on_with_the_answers_it_has(perfect, tmp_path):
     names = [p.stem for p in sorted(perfect[0].iterdir())]
     for name in names:
         files.write_case(tmp_path / "records" / name, {"1.csv": "time\n0\n"})
-    sealed = files.manifest(tmp_path / "records", tmp_path / "keys", names) | {"count": len(names)}
+    sealed = files.manifest(tmp_path / "records", tmp_path / "keys", names) | {
+        "count": len(names), "development_seed": run.DEVELOPMENT_SEED}
     files.write_text(tmp_path / "manifest.json", json.dumps(sealed))
     (tmp_path / "keys").chmod(0)  # as a kill leaves it
     said: list[str] = []
@@ -125,8 +126,9 @@ def test_a_killed_run_goes_on_with_the_answers_it_has(perfect, tmp_path):
     lines = ledger.read_text().splitlines()
     assert len(lines) == 3 and lines[0].startswith("date,set,cases")
     assert run.tables(found)[0][2][0][1] == "120"
-    with pytest.raises(run.InputError, match="holds a set of 120 cases"):
-        run.measure(tmp_path, 5, 0, 1, said.append)
+    for cases, seed in ((5, 0), (len(names), 1), (len(names), None)):
+        with pytest.raises(run.InputError, match="holds a development set of 120 cases"):
+            run.measure(tmp_path, cases, seed, 1, said.append)
     (tmp_path / "keys" / f"{names[0]}.json").write_text("{}")
     with pytest.raises(run.InputError, match="not those of the manifest"):
         run.measure(tmp_path, len(names), 0, 1, said.append)

@@ -50,7 +50,7 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
     records, keys = out / "records", out / "keys"
     for folder in (records, keys):
         folder.mkdir(parents=True, exist_ok=True)
-    names, seed = _roll(keys / "seed.json", cases, seed)
+    names, seed, known = _roll(keys / "seed.json", cases, seed)
     jobs = [(name, design) for name, design in zip(names, designs(cases, seed), strict=True)
             if not ((records / name).is_dir() and (keys / f"{name}.json").is_file())]
     groups = [list(group) for _, group in groupby(sorted(jobs, key=lambda job: _bank_of(job[1])),
@@ -65,18 +65,19 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
             for made in pool.map(_make, groups, [records] * len(groups), [keys] * len(groups)):
                 done += made
                 progress(f"flown {done} of {cases}")
-    sealed = files.manifest(records, keys, names) | {"numbers": numbers.digest(), "count": cases}
+    sealed = files.manifest(records, keys, names) | {
+        "numbers": numbers.digest(), "count": cases, "development_seed": seed if known else None}
     files.write_text(out / "manifest.json", json.dumps(sealed, indent=1))
     return sealed
 
 
-def _roll(path: Path, cases: int, seed: int | None) -> tuple[list[str], int]:
-    """Names and seed of the set, kept with the keys so that an interrupted draw goes on as it began."""
+def _roll(path: Path, cases: int, seed: int | None) -> tuple[list[str], int, bool]:
+    """Names and seed of the set and whether it was given; kept with the keys: an interrupted draw goes on as begun."""
     if path.is_file():
         kept = files.read_json(path)
-        if kept["cases"] != cases or (seed is not None and kept["seed"] != seed):
+        if kept["cases"] != cases or kept["given"] != (seed is not None) or (kept["given"] and kept["seed"] != seed):
             raise ValueError(f"{path.parent.parent} holds a set of {kept['cases']} cases with another seed or number")
-        return kept["names"], kept["seed"]
+        return kept["names"], kept["seed"], kept["given"]
     given = seed is not None
     seed = seed if seed is not None else secrets.randbits(120)
     rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
@@ -85,8 +86,8 @@ def _roll(path: Path, cases: int, seed: int | None) -> tuple[list[str], int]:
         name = rng.bytes(5).hex() if given else secrets.token_hex(5)
         if name not in names:
             names.append(name)
-    files.write_text(path, json.dumps({"cases": cases, "seed": seed, "names": names}))
-    return names, seed
+    files.write_text(path, json.dumps({"cases": cases, "seed": seed, "given": given, "names": names}))
+    return names, seed, given
 
 
 def _bank_of(design: Design) -> tuple[int, float]:
