@@ -18,7 +18,7 @@ from icing_env.atmosphere import density
 from icing_env.effects import Effect, Parameter
 from icing_env.record import FloatArray
 from icing_env.types import DERIVATIVE_NAMES
-from sim2real.channels import LATERAL, MEASURED, TOLERANCE
+from sim2real.channels import LATERAL, MEASURED, SURFACES, TOLERANCE
 from sim2real.predictor import Push
 from sim2real.reconstruct import Reconstruction
 
@@ -40,6 +40,7 @@ class Nuisance:
     factor: float  # relative standard deviation (or absolute, where `absolute`)
     absolute: bool = False
     only: str = ""  # where the power comes from, if it holds for such records alone
+    follows: bool = True  # whether the model that all is flown about follows it
 
     def apply(self, rows: NDArray, row: int, power_from: str, size: float = NUISANCE_STEP) -> None:
         """Move one row of PARAMETERS by `size` standard deviations in this direction."""
@@ -92,7 +93,8 @@ class Bank:
 def nuisances() -> tuple[Nuisance, ...]:
     """Every derivative by `SPREAD`, the mass, the actuators' lags, the timing of channels, and guessed thrust."""
     derivatives = [Nuisance(name, name, SPREAD) for name in DERIVATIVE_NAMES]
-    lags = [Nuisance(f"{s}_lag", f"{s}_lag", LAG_SPREAD, True) for s in ("elevator", "aileron", "rudder")]
+    # flown about a lag that has taken an effect's place, the two no longer look alike, and neither gives way
+    lags = [Nuisance(f"{s}_lag", f"{s}_lag", LAG_SPREAD, True, follows=False) for s in SURFACES]
     guessed = Nuisance("thrust", "thrust_factor_left+thrust_factor_right", THRUST_SPREAD, only="balance")
     timing = (Nuisance("filter_frequency", "filter_frequency", FILTER_SPREAD),
               Nuisance("vane_lag", "vane_lag", VANE_SPREAD, True))
@@ -217,7 +219,7 @@ def not_testable(flight_list: list[Reconstruction], candidates: Bank) -> dict[st
     torque = any(flight.power_from == "torque" for flight in flight_list)
     for family in candidates.families:
         effect = family.effect
-        for surface in ("elevator", "aileron", "rudder"):
+        for surface in SURFACES:
             if f"{surface}_path" in effect.enters_at and f"{surface}_command" not in commands:
                 out[effect.name] = f"needs {surface}_command: positions alone do not show how it follows"
         if effect.name == "spool_lag" and not (torque and "throttle_left" in commands):

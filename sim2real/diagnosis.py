@@ -22,6 +22,7 @@ from sim2real.evidence import Evidence
 from sim2real.manoeuvre import next_manoeuvre
 from sim2real.reconstruct import Reconstruction, reconstruct
 from sim2real.references import Baseline, fit_baseline
+from sim2real.sets import SetFit
 from sim2real.weigh import Progress, fit
 from sim2real.where import components, describe_unknown, regimes
 from sim2real.windows import FREE, cut
@@ -103,12 +104,13 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
                              for i, (f, e) in enumerate(zip(flights, evidences, strict=True))])
     tested = gap.together([gap.energies(f, change, sigma, seed + 1000 + i) for i, f in enumerate(others)]
                           ) if others else None
+    enters_at = {name: effect.enters_at for name, effect in effects.LIBRARY.items()}
     progress("looking for what to fly next")
     return Diagnosis(
         verdict=verdict,
         hypotheses=hypotheses,
         credible_set_95=credible([h["probability"] for h in hypotheses]),
-        where={"channels": gap.by_channel(training.before), "components": components(posterior),
+        where={"channels": gap.by_channel(training.before), "components": components(posterior, enters_at),
                "regimes": regimes(evidences)},
         effects=[describe(name, posterior) for name, p in ranked(posterior) if p >= LISTED],
         not_testable=[{"effect": name, "why": why} for name, why in sorted(untestable.items())],
@@ -134,13 +136,10 @@ def ranked(posterior: Posterior) -> list[tuple[str, float]]:
 
 def judge(posterior: Posterior) -> tuple[str, list[dict[str, Any]]]:
     """Verdict, and every hypothesis with its probability, the most probable first."""
-    found: list[dict[str, Any]] = [
-        {"effects": [], "unknown": False, "probability": posterior.none},
-        {"effects": [], "unknown": True, "probability": posterior.unknown},
-        *({"effects": [name], "unknown": False, "probability": p} for name, p in posterior.effects.items()),
-    ]
+    found: list[dict[str, Any]] = [{"effects": list(h.effects), "unknown": h.unknown is not None,
+                                    "probability": h.probability} for h in posterior.hypotheses]
     verdict = "no_gap" if posterior.none >= 0.5 else "unknown" if posterior.unknown >= 0.5 else "explained"
-    return verdict, sorted(found, key=lambda h: -h["probability"])
+    return verdict, found
 
 
 def credible(probabilities: Sequence[float], level: float = 0.95) -> list[int]:
@@ -149,27 +148,34 @@ def credible(probabilities: Sequence[float], level: float = 0.95) -> list[int]:
     return list(range(min(count, len(probabilities))))
 
 
-def values_of(name: str, posterior: Posterior) -> dict[str, float]:
-    """Fitted parameters of an effect."""
-    fit = posterior.fits[name]
-    return {**fit.family.effect.neutral(), fit.family.parameter.name: fit.estimate}
+def values_of(fit: SetFit) -> dict[str, dict[str, float]]:
+    """Fitted parameters of every effect of a set."""
+    return {family.effect.name: {**family.effect.neutral(), family.parameter.name: size}
+            for family, size in zip(fit.families, fit.estimate, strict=True)}
 
 
 def remedy(verdict: str, posterior: Posterior) -> Callable[[NDArray], NDArray]:
-    """What the diagnosis changes in the model: its first effect where it explains, else nothing."""
+    """What the diagnosis changes in the model: its most probable set of effects where it explains, else nothing."""
     if verdict != "explained":
         return lambda parameters: parameters
-    name = ranked(posterior)[0][0]
-    return lambda parameters: effects.with_effects(parameters, {name: values_of(name, posterior)})
+    values = values_of(explanation(posterior))
+    return lambda parameters: effects.with_effects(parameters, values)
+
+
+def explanation(posterior: Posterior) -> SetFit:
+    """The most probable set of effects that is not empty."""
+    return next(h.fit for h in posterior.hypotheses if h.effects)
 
 
 def describe(name: str, posterior: Posterior) -> dict[str, Any]:
-    """One effect's entry."""
-    fit = posterior.fits[name]
-    effect, parameter = fit.family.effect, fit.family.parameter
+    """One effect's entry: its size as in the most probable set that holds it."""
+    fit = posterior.leading(name)
+    at = fit.effects.index(name)
+    effect, parameter = fit.families[at].effect, fit.families[at].parameter
     shown = {p.name: {"estimate": p.neutral, "low95": p.neutral, "high95": p.neutral, "unit": p.unit}
              for p in effect.parameters}
-    shown[parameter.name] = {"estimate": fit.estimate, "low95": fit.low95, "high95": fit.high95, "unit": parameter.unit}
+    shown[parameter.name] = {"estimate": fit.estimate[at], "low95": fit.low95[at], "high95": fit.high95[at],
+                             "unit": parameter.unit}
     return {"name": name, "probability": posterior.effects[name], "enters_at": list(effect.enters_at),
             "scope": "shared", "history": None, "parameters": shown,
             "indistinguishable_from": list(posterior.classes[name])}
@@ -184,11 +190,12 @@ def detection_limits(posterior: Posterior) -> dict[str, dict[str, Any]]:
 def _next(flight: Reconstruction, candidates: Bank, posterior: Posterior, hypotheses: list[dict[str, Any]],
           sigma: float) -> dict[str, Any] | None:
     inside = [hypotheses[i] for i in credible([h["probability"] for h in hypotheses])]
-    names = [h["effects"][0] for h in inside if h["effects"]]
+    names = list(dict.fromkeys(name for h in inside for name in h["effects"]))
     if len(names) == 1:
         names += [n for n in posterior.classes[names[0]] if n not in names]
-    rivals = {n: values_of(n, posterior) for n in names}
-    return next_manoeuvre(flight, candidates, rivals, {n: max(posterior.effects[n], 1e-3) for n in names}, sigma)
+    rivals = {n: values_of(posterior.leading(n))[n] for n in names}
+    likely = posterior.effects
+    return next_manoeuvre(flight, candidates, rivals, {n: max(likely[n], 1e-3) for n in names}, sigma)
 
 
 def resimulation(verdict: str, posterior: Posterior, training: gap.Energy, flights: Sequence[Reconstruction],
@@ -196,10 +203,10 @@ def resimulation(verdict: str, posterior: Posterior, training: gap.Energy, fligh
     """What to fly to see the diagnosis for oneself."""
     command, covariance = "icing fly clear_air", None
     if verdict == "explained":
-        name = ranked(posterior)[0][0]
-        fit = posterior.fits[name]
-        command += f" --effect {name}:" + ",".join(f"{k}={v:.6g}" for k, v in values_of(name, posterior).items())
-        covariance = [[((fit.high95 - fit.low95) / 3.92) ** 2]]
+        fit = explanation(posterior)
+        for name, values in values_of(fit).items():
+            command += f" --effect {name}:" + ",".join(f"{k}={v:.6g}" for k, v in values.items())
+        covariance = None if fit.covariance is None else fit.covariance.tolist()
     starts, at = [], 0
     for flight in flights:
         starts.append(training.starts[at])

@@ -17,7 +17,7 @@ from sim2real.candidates import Bank, parameter_rows, pushes
 from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR
 from sim2real.kalman import Gain, gains
 from sim2real.paths import path_residuals
-from sim2real.predictor import held, innovations
+from sim2real.predictor import Push, held, innovations
 from sim2real.reconstruct import Reconstruction
 
 SIGMAS = (0.02, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.5, 2.2, 3.2)  # m/s
@@ -32,30 +32,47 @@ class Evidence:
     Attributes:
         gram: [rows, rows] inner products; row 0 the whitened innovations v of the model itself, row j > 0 the
             signature v_j - v of candidate j.
-        sigma_w: gust intensity [m/s] the record was whitened with.
+        gain: the predictor's, with the gust intensity that the record was whitened with.
+        factor: whitens innovations [channels, channels].
         samples: whitened numbers behind the inner products.
         whitened: [N, channels of MEASURED], v itself, for showing where the gap lies.
     """
 
     gram: FloatArray
-    sigma_w: float
+    gain: Gain
+    factor: FloatArray
     samples: int
     whitened: FloatArray
     flight: Reconstruction
 
+    @property
+    def sigma_w(self) -> float:
+        """Gust intensity, m/s."""
+        return self.gain.sigma
 
-def gather(flight: Reconstruction, bank: Bank) -> Evidence:
-    """Fly every candidate along one record."""
-    options = gains(flight, SIGMAS)
-    gain, base = choose_gain(flight, options)
-    rows = parameter_rows(flight, bank)
+
+def gather(flight: Reconstruction, bank: Bank, gain: Gain | None = None) -> Evidence:
+    """Fly every candidate along one record.
+
+    Args:
+        gain: of the predictor; the likeliest of SIGMAS if omitted.
+    """
+    if gain is None:
+        gain = choose_gain(flight, gains(flight, SIGMAS)).with_start()
+    base = innovations(flight, flight.parameters, gain.K)[:, 0].astype(float)
+    factor = whitening(base[round(SETTLE / flight.dt) :], gain, flight)
     pushed = pushes(replace(flight, measured=predicted(flight, base)), bank)
+    return compare(flight, parameter_rows(flight, bank), pushed, gain, factor)
+
+
+def compare(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain: Gain,
+            factor: FloatArray) -> Evidence:
+    """Inner products of rows flown along one record, the first being the one that the others are compared with."""
     moved = flown_rows(flight, rows, {q.row for q in pushed})
     index = {row: i for i, row in enumerate(moved)}
     renamed = tuple(replace(q, row=index[q.row]) for q in pushed)
     left = innovations(flight, rows[moved], gain.K, renamed)
     first = round(SETTLE / flight.dt)
-    factor = whitening(left[first:, 0], gain, flight)
     flown, samples = np.zeros((len(moved), len(moved))), 0
     whitened = np.zeros((len(left), len(MEASURED)))
     for k in range(first, len(left), CHUNK):
@@ -66,14 +83,14 @@ def gather(flight: Reconstruction, bank: Bank) -> Evidence:
         flat = flat[np.any(flat != 0.0, axis=1)]  # a sparse channel's blanks
         flat[:, 1:] -= flat[:, :1]
         flown += flat.T @ flat
-    gram = np.zeros((bank.size, bank.size))
+    gram = np.zeros((len(rows), len(rows)))
     gram[np.ix_(moved, moved)] = flown
     for path, own in path_residuals(flight, rows):
         path = path[first:].copy()
         path[:, 1:] -= path[:, :1]
         gram[np.ix_(own, own)] += path.T @ path
         samples += len(path)
-    return Evidence(gram, gain.sigma, samples, whitened, flight)
+    return Evidence(gram, gain, factor, samples, whitened, flight)
 
 
 def flown_rows(flight: Reconstruction, rows: FloatArray, pushed: set[int]) -> list[int]:
@@ -82,13 +99,13 @@ def flown_rows(flight: Reconstruction, rows: FloatArray, pushed: set[int]) -> li
     return [j for j in range(len(rows)) if j == 0 or j in pushed or kept[j].tobytes() != kept[0].tobytes()]
 
 
-def choose_gain(flight: Reconstruction, options: list[Gain]) -> tuple[Gain, FloatArray]:
-    """The gust intensity that makes the model's innovations likeliest, and those innovations [N-1, channels].
+def choose_gain(flight: Reconstruction, options: list[Gain]) -> Gain:
+    """The gust intensity that makes the model's innovations likeliest.
 
     Their size is taken from medians: a gap that shows as an offset or in the moments of a manoeuvre is no gust.
     """
     left = innovations(flight, np.repeat(flight.parameters, len(options)), np.stack([g.K for g in options]))
-    whole, left = left, left[round(SETTLE / flight.dt) :]
+    left = left[round(SETTLE / flight.dt) :]
     scores = []
     for i, gain in enumerate(options):
         use = [c for c in range(FED_BACK - 1) if flight.has(MEASURED[c])]
@@ -97,8 +114,7 @@ def choose_gain(flight: Reconstruction, options: list[Gain]) -> tuple[Gain, Floa
         white = np.linalg.solve(factor, z.T)
         away = np.median(np.abs(white - np.median(white, axis=1, keepdims=True)), axis=1)
         scores.append(-0.5 * np.sum((1.4826 * away) ** 2) - np.sum(np.log(np.diag(factor))))
-    best = int(np.argmax(scores))
-    return options[best], whole[:, best].astype(float)
+    return options[int(np.argmax(scores))]
 
 
 def predicted(flight: Reconstruction, left: FloatArray) -> FloatArray:

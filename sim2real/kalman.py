@@ -7,13 +7,13 @@ Filtering, section 5.4). The first seconds have gains of their own, from the unc
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from icing_env.record import FloatArray
 from icing_env.turbulence import pair_noise, scales
-from sim2real.channels import FED_BACK, MEASURED, SURFACES
+from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR, SURFACES
 from sim2real.predictor import TANGENT, Predictor
 from sim2real.reconstruct import Reconstruction
 
@@ -22,6 +22,7 @@ from sim2real.reconstruct import Reconstruction
 WALK = {"u": 0.03, "v": 0.03, "w": 0.03, "p": 7e-4, "q": 7e-4, "r": 7e-4, "altitude": 0.05, "phi": 4e-4,
         "theta": 4e-4}  # fmt: skip
 TRANSIENT = 10.0  # s with gains of their own after the start
+ROUGH = 60  # steps after which a gust no longer shows in third differences
 DOUBLINGS = 16  # 65536 steps
 SURFACE_NOISE = 7.6e-4  # rad, of recorded positions: 0.03 deg (configs/instruments), 1.46 times that unfiltered
 
@@ -32,13 +33,22 @@ class Gain:
 
     Attributes:
         sigma: m/s.
-        K: of the first steps, then the steady one [steps, states, fed-back channels].
+        K: of the steps, the last one's for good [steps, states, fed-back channels].
         S: covariance of the steady innovations.
+        model: A, C, and the covariances of the states' noise, the readings' noise and between them.
+        duration: steps of the start that have gains of their own.
     """
 
     sigma: float
     K: FloatArray
     S: FloatArray
+    model: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+    duration: int
+
+    def with_start(self) -> Gain:
+        """The same with gains of their own for the first steps, from the uncertainty of the start."""
+        first = _transient(*self.model, _start_covariance(self.sigma), self.duration)
+        return replace(self, K=np.concatenate([first, self.K[-1:]]))
 
 
 def linearise(flight: Reconstruction) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -75,18 +85,33 @@ def gains(flight: Reconstruction, sigmas: tuple[float, ...]) -> list[Gain]:
     walk = np.array([WALK.get(name, 1e-6) for name in TANGENT]) ** 2 * flight.dt
     blank = np.array([not flight.has(name) for name in MEASURED[:FED_BACK]])
     rate = np.array([max(np.mean(np.isfinite(flight.measured[:, j])), 1e-3) for j in range(FED_BACK)])
-    R = np.diag(np.where(blank, 1e6, flight.noise[:FED_BACK] ** 2 / rate))
+    least = np.array([NOISE_FLOOR[name] for name in MEASURED[:FED_BACK]])
     out = []
     for sigma in sigmas:
         Qw = gust_noise(sigma, speed, height, flight.dt)
         columns = [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
         G, D = A[:, columns], C[:, columns]
         Q = G @ Qw @ G.T + np.diag(walk) + SURFACE_NOISE**2 * (B @ B.T)
+        own = np.maximum(flight.noise[:FED_BACK] ** 2 - roughness(A, C, G, D, Qw), least**2)
+        R = np.diag(np.where(blank, 1e6, own / rate))
         Rt, cross = D @ Qw @ D.T + R, G @ Qw @ D.T
         steady, S = _steady(A, C, Q, Rt, cross)
-        first = _transient(A, C, Q, Rt, cross, _start_covariance(sigma), round(TRANSIENT / flight.dt))
-        out.append(Gain(sigma, np.concatenate([first, steady[None]]), S))
+        out.append(Gain(sigma, steady[None], S, (A, C, Q, Rt, cross), round(TRANSIENT / flight.dt)))
     return out
+
+
+def roughness(A: FloatArray, C: FloatArray, G: FloatArray, D: FloatArray, Qw: FloatArray) -> FloatArray:
+    """What gusts add to each channel's noise variance as third differences tell it [channels].
+
+    At sigma_w = 1.5 m/s they double the apparent noise of az; believed, it makes the gain too small, the innovations
+    coloured, and the colour looks like a vane's scale and a downwash lag.
+    """
+    response, state = [np.zeros_like(D)] * 3 + [D], G
+    for _ in range(ROUGH):
+        response.append(C @ state)
+        state = A @ state
+    third = np.diff(np.array(response), 3, axis=0)
+    return np.asarray(np.einsum("nci,ij,ncj->c", third, Qw, third) / 20.0)
 
 
 def _steady(

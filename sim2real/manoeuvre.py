@@ -13,13 +13,14 @@ from icing_env import effects
 from icing_env.errors import InputError
 from icing_env.record import FloatArray
 from icing_env.trim import trim
-from sim2real.attribution import INDISTINGUISHABLE, reduce
+from sim2real.attribution import reduce
 from sim2real.candidates import Bank
 from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR
 from sim2real.evidence import SETTLE, whiten
 from sim2real.kalman import gains
 from sim2real.predictor import Predictor, innovations, put
 from sim2real.reconstruct import Reconstruction
+from sim2real.singles import INDISTINGUISHABLE
 
 DURATION = 30.0  # s
 TARGET = 5.0  # distance beyond which more is worth nothing (bounded Hunter-Reiner criterion)
@@ -119,7 +120,7 @@ def distances(made: Reconstruction, bank: Bank, rivals: list[tuple[str, Mapping[
         nuisance.apply(rows, j, made.power_from)
     for j, (name, values) in enumerate(rivals, start=1 + len(bank.nuisances)):
         rows[j : j + 1] = effects.with_effects(rows[j : j + 1], {name: values})
-    gain = gains(made, (sigma,))[0]
+    gain = gains(made, (sigma,))[0].with_start()
     left = whiten(innovations(made, rows, gain.K)[round(SETTLE / made.dt) :], _factor(made, gain.S))
     flat = left.transpose(0, 2, 1).reshape(-1, len(rows))
     flat = flat - np.where(np.arange(len(rows)) > 0, flat[:, :1], 0.0)

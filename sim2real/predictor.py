@@ -24,7 +24,7 @@ from sim2real.channels import FED_BACK, MEASURED, SURFACES
 from sim2real.reconstruct import Reconstruction
 
 STATES = ("u", "v", "w", "p", "q", "r", "altitude", "alpha_downwash", "dryden_u", "dryden_v1", "dryden_v2",
-          "dryden_w1", "dryden_w2", "gust_w", "gust_w_tail", "pitot", "vane_alpha", "vane_beta",
+          "dryden_w1", "dryden_w2", "gust_u", "gust_v", "gust_w", "gust_w_tail", "pitot", "vane_alpha", "vane_beta",
           *(f"filtered_{c}" for c in ("alpha", "beta", "p", "q", "r", "ax", "ay", "az")))  # fmt: skip
 ANGLES = ("phi", "theta")  # corrected through the quaternion
 TANGENT = (*STATES, *ANGLES)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import logsumexp
 
 from sim2real.attribution import Posterior
 from sim2real.candidates import DEVIATION, GENERIC, GENERIC_SIZE
@@ -19,15 +18,20 @@ SHOWN = 4.0  # standard deviations of the mean whitened energy of a bin above on
 TARGETS = {component: target for component, target, _ in GENERIC}
 
 
-def components(posterior: Posterior) -> dict[str, float]:
-    """Probability that the gap enters at each component, those above one in a thousand."""
+def components(posterior: Posterior, enters_at: Mapping[str, Sequence[str]]) -> dict[str, float]:
+    """Probability that the gap enters at each component, those above one in a thousand.
+
+    Args:
+        enters_at: components of every effect.
+    """
     out: dict[str, float] = {}
-    for name, p in posterior.effects.items():
-        for component in posterior.fits[name].family.effect.enters_at:
-            out[component] = out.get(component, 0.0) + p
-    logs = np.array([fit.log_evidence for fit in posterior.unknown_fits])
-    for fit, share in zip(posterior.unknown_fits, np.exp(logs - logsumexp(logs)), strict=True):
-        out[fit.component] = out.get(fit.component, 0.0) + posterior.unknown * float(share)
+    for hypothesis in posterior.hypotheses:
+        touched = {c for name in hypothesis.effects for c in enters_at[name]}
+        for component in touched:
+            out[component] = out.get(component, 0.0) + hypothesis.probability
+        if hypothesis.unknown is not None and hypothesis.unknown.component not in touched:
+            at = hypothesis.unknown.component
+            out[at] = out.get(at, 0.0) + hypothesis.probability
     return {k: min(v, 1.0) for k, v in sorted(out.items(), key=lambda item: -item[1]) if v > 1e-3}
 
 
@@ -54,9 +58,9 @@ def regimes(evidences: Sequence[Evidence]) -> list[dict[str, Any]]:
 
 def describe_unknown(posterior: Posterior) -> dict[str, Any] | None:
     """Component, terms and kind of what the library lacks; None where that is improbable."""
-    if posterior.unknown < 0.05 or not posterior.unknown_fits:
+    fit = next((h.unknown for h in posterior.hypotheses if h.unknown is not None), None)
+    if posterior.unknown < 0.05 or fit is None:
         return None
-    fit = max(posterior.unknown_fits, key=lambda u: u.log_evidence)
     target = TARGETS[fit.component]
     terms: list[dict[str, Any]] = []
     for name, value, error in fit.terms:

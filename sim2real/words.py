@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from sim2real.diagnosis import Diagnosis
 
 
@@ -15,17 +17,23 @@ def _finding(found: Diagnosis) -> str:
     sure = f"probability {first['probability']:.2f}"
     if found.verdict == "no_gap":
         return f"The records show no gap beyond the model's own uncertainty ({sure})."
-    if found.verdict == "unknown":
+    if found.verdict == "unknown" and not first["effects"]:
         where = found.unknown["component"] if found.unknown else "nowhere in particular"
         return f"There is a gap that nothing in the library explains; it enters at {where} ({sure})."
     if not first["effects"]:
         return "There is a gap, but no single explanation stands out."
-    effect = next(e for e in found.effects if e["name"] == first["effects"][0])
+    named = [_named(next(e for e in found.effects if e["name"] == name)) for name in first["effects"]]
+    beside = ["something that the library lacks"] if first["unknown"] else []
+    return f"The gap is best explained by {' and '.join(named + beside)} ({sure})."
+
+
+def _named(effect: dict[str, Any]) -> str:
+    """An effect with its size, and what it may be taken for."""
     size = ", ".join(f"{k} {p['estimate']:.3g} {'' if p['unit'] == '1' else p['unit']}".rstrip()
                      for k, p in effect["parameters"].items() if p["low95"] != p["high95"])  # fmt: skip
     told = effect["indistinguishable_from"]
-    other = f", which these records cannot tell from {', '.join(told)}" if told else ""
-    return f"The gap is best explained by {effect['name']} ({size}; {sure}){other}."
+    other = f", which these records cannot tell from {', '.join(told)}," if told else ""
+    return f"{effect['name']} ({size}){other}"
 
 
 def _closing(found: Diagnosis) -> str:

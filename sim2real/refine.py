@@ -1,0 +1,213 @@
+"""The leading explanations flown about their own fitted sizes and nuisances, before they are reported.
+
+Polynomials between the sizes flown, and signatures that add, hold only nearby: where an effect is large or bends (a
+rate limit, a stall), what the polynomial misses would be blamed on a second effect. Each leading set is therefore flown
+where it was fitted, with its own slopes, and fitted by Gauss-Newton; its evidence is corrected by what it gained or
+lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from icing_env import effects
+from icing_env.record import FloatArray
+from sim2real.attribution import Hypothesis, Posterior, normalised
+from sim2real.candidates import NUISANCE_STEP, Bank, pushes, shifted
+from sim2real.evidence import Evidence, compare, predicted
+from sim2real.generic import fit_unknown
+from sim2real.predictor import innovations
+from sim2real.reconstruct import Reconstruction
+from sim2real.references import Baseline
+from sim2real.sets import Modes, SetFit, integrate
+from sim2real.sizes import in_powers
+
+LEADING, LIKELY = 3, 0.02  # explanations that are flown again, and how probable they have to be
+CERTAIN = 0.05  # probability of no gap above which nothing is: sizes near zero have no likelihood of Gaussian shape
+ROUNDS = 2
+SETTLED = 0.2  # gain of half the whitened square that is worth another round
+FARTHEST = 6.0  # standard deviations of a nuisance
+
+
+@dataclass(frozen=True)
+class Point:
+    """A set at given sizes [k] and nuisances [n], flown.
+
+    cost: half the whitened square it leaves, the nuisances' prior included, tempered; slope and information: of sizes
+    (in ranges of their parameters), then nuisances.
+    """
+
+    sizes: FloatArray
+    nuisances: FloatArray
+    cost: float
+    slope: FloatArray
+    information: FloatArray
+
+
+def leading(posterior: Posterior) -> list[Hypothesis]:
+    """Explanations to fly again where there is a gap at all: the probable ones, and the best single effect."""
+    if posterior.none > CERTAIN:
+        return []
+    known = [h for h in posterior.hypotheses if h.unknown is None]
+    chosen = [h for h in known if h.probability > LIKELY][:LEADING]
+    chosen += [h for h in known if len(h.effects) == 1 and h not in chosen][:1]
+    return chosen if any(h.effects for h in chosen) else []
+
+
+def refine(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
+           centres: dict[int, FloatArray], posterior: Posterior) -> Posterior:
+    """The posterior with its leading explanations fitted where they lie.
+
+    Args:
+        flights: the records about the baseline.
+        evidences: as gathered, for their gains and whitening.
+        centres: best nuisances [n] of each leading hypothesis, by its place in `posterior.hypotheses`.
+    """
+    found, points = list(posterior.hypotheses), {}
+    for i, centre in centres.items():
+        point = _settle(flights, candidates, evidences, baseline, posterior.tempering, found[i].fit, centre)
+        found[i] = _corrected(found[i], point, posterior)
+        points[i] = point
+    best = max(points, key=lambda i: found[i].log_prior + found[i].log_evidence)
+    for j, other in enumerate(found):
+        if other.unknown is not None and other.effects == found[best].effects:
+            found[j] = _beside(flights, candidates, evidences, baseline, posterior.tempering, found[best], points[best],
+                               other)
+    return replace(posterior, hypotheses=normalised(found))
+
+
+def _beside(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
+            tempering: float, known: Hypothesis, point: Point, other: Hypothesis) -> Hypothesis:
+    """The unknown beside a set (or alone), judged on what the set leaves over where it was flown."""
+    k, n = len(point.sizes), len(point.nuisances)
+    first, count = 1 + k + n, len(candidates.terms)
+    steps = _steps(known.fit, point.sizes)
+    gram = np.zeros((first + count, first + count))
+    for flight, evidence in zip(flights, evidences, strict=True):
+        rows = _rows(flight, candidates, known.fit, point.sizes, steps, point.nuisances)
+        base = innovations(replace(flight, parameters=rows[:1]), rows[:1], evidence.gain.K)[:, 0].astype(float)
+        pushed = tuple(replace(q, row=first + j) for j, q in enumerate(
+            pushes(replace(flight, measured=predicted(flight, base)), candidates)))
+        rows = np.concatenate([rows, np.repeat(rows[:1], count)])
+        gram += compare(flight, rows, pushed, evidence.gain, evidence.factor).gram / tempering
+    gram[first - n : first, first - n : first] += baseline.precision
+    gram[first - n : first, 0] += baseline.precision @ point.nuisances
+    gram[0, first - n : first] = gram[first - n : first, 0]
+    gram[0, 0] += point.nuisances @ baseline.precision @ point.nuisances
+    own = np.arange(1, first)
+    inner = gram[np.ix_(own, own)] + 1e-2 * np.diag(np.arange(first - 1) < k)
+    reduced = gram - gram[:, own] @ np.linalg.solve(inner, gram[own])
+    moved = replace(candidates, terms=tuple(replace(t, row=first + j) for j, t in enumerate(candidates.terms)))
+    fits = fit_unknown(reduced, moved)
+    best = max(fits, key=lambda u: u.log_evidence)
+    gain = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
+    weights = {t.row: best.weights[first + j] for j, t in enumerate(candidates.terms) if first + j in best.weights}
+    return replace(other, fit=known.fit, unknown=replace(best, weights=weights),
+                   log_evidence=known.log_evidence + gain)  # fmt: skip
+
+
+def _settle(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
+            tempering: float, fit: SetFit, centre: FloatArray) -> Point:
+    """Gauss-Newton from a set's linear fit; a step that does not help is halved."""
+    def fly(sizes: FloatArray, nuisances: FloatArray) -> Point:
+        return _point(flights, candidates, evidences, baseline, tempering, fit, sizes, nuisances)
+
+    low, high = (np.array([getattr(f.parameter, end) for f in fit.families]) for end in ("low", "high"))
+    best, share = fly(np.array(fit.estimate), centre), 1.0
+    for _ in range(ROUNDS):
+        step = -share * np.linalg.solve(best.information, best.slope)
+        if -0.5 * float(step @ best.slope) < SETTLED:
+            break
+        k = len(low)
+        sizes = np.clip(best.sizes + step[:k] * (high - low), low, high)
+        tried = fly(sizes, np.clip(best.nuisances + step[k:], -FARTHEST, FARTHEST))
+        best, share = (tried, 1.0) if tried.cost < best.cost else (best, 0.5 * share)
+    return best
+
+
+def _point(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
+           tempering: float, fit: SetFit, sizes: FloatArray, nuisances: FloatArray) -> Point:
+    k, n = len(sizes), len(nuisances)
+    steps = _steps(fit, sizes)
+    gram = np.zeros((1 + k + n, 1 + k + n))
+    for flight, evidence in zip(flights, evidences, strict=True):
+        rows = _rows(flight, candidates, fit, sizes, steps, nuisances)
+        gram += compare(flight, rows, (), evidence.gain, evidence.factor).gram / tempering
+    span = np.array([f.parameter.high - f.parameter.low for f in fit.families])
+    unit = np.concatenate([[1.0], span / steps if k else [], np.full(n, 1.0 / NUISANCE_STEP)])
+    gram = gram * unit[:, None] * unit
+    prior = baseline.precision
+    slope, information = gram[1:, 0].copy(), gram[1:, 1:].copy()
+    slope[k:] += prior @ nuisances
+    information[k:, k:] += prior
+    information[:k, :k] += np.eye(k)  # a size moves no farther than its range
+    cost = 0.5 * (gram[0, 0] + nuisances @ prior @ nuisances)
+    return Point(sizes, nuisances, float(cost), slope, information)
+
+
+def _steps(fit: SetFit, sizes: FloatArray) -> FloatArray:
+    """Step of each size for its slope: about its uncertainty, inwards."""
+    out = np.zeros(len(sizes))
+    for m, (family, size) in enumerate(zip(fit.families, sizes, strict=True)):
+        low, high = family.parameter.low, family.parameter.high
+        spread = 0.0 if fit.covariance is None else float(np.sqrt(fit.covariance[m, m]))
+        step = min(max(spread, 1e-3 * (high - low)), 0.1 * (high - low))
+        out[m] = step if size + step <= high else -step
+    return out
+
+
+def _rows(flight: Reconstruction, candidates: Bank, fit: SetFit, sizes: FloatArray, steps: FloatArray,
+          nuisances: FloatArray) -> NDArray:
+    """PARAMETERS: the set where it is fitted, then a step of each size, then a step of each nuisance."""
+    own = np.tile(nuisances, (1 + len(nuisances), 1))
+    own[1:] += NUISANCE_STEP * np.eye(len(nuisances))
+    models = np.concatenate([shifted(flight.parameters, candidates.nuisances, v, flight.power_from) for v in own])
+    moved = np.tile(sizes, (1 + len(sizes), 1))
+    moved[1:] += np.diag(steps)
+    out = [_with(models[:1], fit, s) for s in moved]
+    return np.concatenate([*out, _with(models[1:], fit, sizes)])
+
+
+def _with(rows: NDArray, fit: SetFit, sizes: FloatArray) -> NDArray:
+    return effects.with_effects(rows, {f.effect.name: {f.parameter.name: float(s)}
+                                       for f, s in zip(fit.families, sizes, strict=True)})  # fmt: skip
+
+
+def _corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior) -> Hypothesis:
+    """Evidence and sizes of a set from where it settled: its likelihood is taken as Gaussian there."""
+    none = 0.5 * float(posterior.reduced[0, 0])
+    last: FloatArray = np.asarray(np.linalg.solve(point.information, point.slope), np.float64)
+    cost = point.cost - 0.5 * float(point.slope @ last)
+    k = len(point.sizes)
+    if k == 0:
+        return replace(hypothesis, log_evidence=none - cost, fit=replace(hypothesis.fit, misfit=2.0 * cost))
+    inner, across = point.information[:k, :k], point.information[:k, k:]
+    alone = np.asarray(inner - across @ np.linalg.solve(point.information[k:, k:], across.T), np.float64)
+    fit = _integrated(hypothesis.fit, point.sizes, last[:k], cost, alone)
+    log = fit.log_evidence + none
+    return replace(hypothesis, log_evidence=log, fit=replace(fit, log_evidence=log))
+
+
+def _integrated(fit: SetFit, sizes: FloatArray, last: FloatArray, cost: float, information: FloatArray) -> SetFit:
+    """Prior times a Gaussian likelihood of the sizes; log_evidence is the log of its integral.
+
+    Args:
+        sizes, last: where the set was flown, and the step (in ranges of the parameters) that is left.
+        cost, information: half the whitened square there, and its second derivative per square of range.
+    """
+    families, k = fit.families, len(sizes)
+    size = 1 + max(max(f.rows) for f in families)
+    base = in_powers(np.zeros((size, size)), families)
+    span = np.array([f.parameter.high - f.parameter.low for f in families])
+    x = np.clip((sizes - last * span - base.neutral) / base.reach, base.low, base.high)
+    H = information * np.outer(base.reach / span, base.reach / span)
+    gram = np.zeros((1 + k, 1 + k))
+    gram[0, 0], gram[0, 1:], gram[1:, 0], gram[1:, 1:] = 2.0 * cost + x @ H @ x, -H @ x, -H @ x, H
+    modes = Modes(np.arange(k)[None], x[None], np.array([cost]), H[None], np.zeros(1))
+    found = integrate(replace(base, gram=gram, degree=1), modes, 0)
+    return replace(found, log_evidence=found.log_evidence - 0.5 * float(gram[0, 0]))

@@ -1,0 +1,93 @@
+"""An effect's size as a number: what is believed of it beforehand, and signatures as polynomials in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from icing_env.effects import Parameter
+from icing_env.record import FloatArray
+from sim2real.candidates import Family
+
+OTHER_SIGN = 0.25  # prior share of sizes of the sign opposite to the typical one (assumed)
+WIDTH = 0.9  # standard deviation of log|s / typical| (assumed)
+TABLE = 1201  # points of a tabulated prior
+
+
+def size_prior(parameter: Parameter, size: FloatArray) -> FloatArray:
+    """Density of an effect's size: log-normal about the typical one, a share with the other sign, inside its range."""
+    reach = abs(parameter.typical) or 0.25 * max(parameter.high, -parameter.low)
+    magnitude = np.maximum(np.abs(size - parameter.neutral), 1e-9 * reach)
+    shape = np.exp(-0.5 * (np.log(magnitude / reach) / WIDTH) ** 2) / magnitude
+    sign = np.sign(parameter.typical) or 1.0
+    both = parameter.low < parameter.neutral < parameter.high
+    other = OTHER_SIGN if both else 0.0
+    if parameter.typical == parameter.neutral:
+        other = 0.5
+    density = shape * np.where(np.sign(size - parameter.neutral) == sign, 1.0 - other, other)
+    total = float(np.sum(density * np.gradient(size)))
+    return np.asarray(density / total) if total > 0.0 else density
+
+
+@dataclass(frozen=True)
+class Powers:
+    """Inner products with every family's signature written in powers of its size x.
+
+    x = (size - neutral)/reach, reach the farthest size flown, so that |x| <= 1; the signature is sum_k x^k E_k.
+
+    Attributes:
+        families: F of them.
+        gram: [1 + F degree, 1 + F degree]; row 0 the residual, then E_1 ... E_degree of each family (zeros where a
+            family was flown at fewer sizes).
+        degree: powers kept of each family.
+        neutral, reach, low, high: [F]; the ends of the range in x.
+        prior: [F, TABLE] density of x between its ends.
+    """
+
+    families: tuple[Family, ...]
+    gram: FloatArray
+    degree: int
+    neutral: FloatArray
+    reach: FloatArray
+    low: FloatArray
+    high: FloatArray
+    prior: FloatArray
+
+    def size(self, members: FloatArray, x: FloatArray) -> FloatArray:
+        """Sizes in their own units."""
+        return np.asarray(self.neutral[members] + self.reach[members] * x)
+
+    def density(self, member: int, x: FloatArray) -> FloatArray:
+        """Prior density of x; zero outside the range."""
+        grid = np.linspace(self.low[member], self.high[member], TABLE)
+        return np.interp(x, grid, self.prior[member], left=0.0, right=0.0)
+
+
+def in_powers(reduced: FloatArray, families: tuple[Family, ...]) -> Powers:
+    """Turn inner products of flown sizes into inner products of powers (Lagrange's polynomials through the sizes)."""
+    degree = max((len(f.nodes) for f in families), default=1)
+    change = np.zeros((1 + len(families) * degree, len(reduced)))
+    change[0, 0] = 1.0
+    neutral = np.array([f.parameter.neutral for f in families])
+    reach = np.array([max(abs(s - f.parameter.neutral) for s in f.nodes) for f in families])
+    for m, family in enumerate(families):
+        x = (np.array(family.nodes) - neutral[m]) / reach[m]
+        powers = x[:, None] ** np.arange(1, len(x) + 1)  # signature(x_i) = sum_k x_i^k E_k
+        first = 1 + m * degree
+        change[first : first + len(x), list(family.rows)] = np.linalg.inv(powers)
+    low = np.array([(f.parameter.low - f.parameter.neutral) for f in families]) / reach
+    high = np.array([(f.parameter.high - f.parameter.neutral) for f in families]) / reach
+    prior = np.empty((len(families), TABLE))
+    for m, family in enumerate(families):
+        prior[m] = size_prior(family.parameter, neutral[m] + reach[m] * np.linspace(low[m], high[m], TABLE)) * reach[m]
+    return Powers(families, change @ reduced @ change.T, degree, neutral, reach, low, high, prior)
+
+
+def flown_weights(family: Family, size: float) -> dict[int, float]:
+    """Weights of the flown sizes' signatures at one size."""
+    reach = max(abs(s - family.parameter.neutral) for s in family.nodes)
+    x = (np.array(family.nodes) - family.parameter.neutral) / reach
+    at = ((size - family.parameter.neutral) / reach) ** np.arange(1, len(x) + 1)
+    return dict(zip(family.rows, (float(w) for w in at @ np.linalg.inv(x[:, None] ** np.arange(1, len(x) + 1))),
+                    strict=True))  # fmt: skip
