@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from controlled import free
 from small_aircraft import controls
 
 from controllers.laws import autopilot
@@ -14,7 +15,7 @@ from estimators.observer.layout import PARAMETER_NAMES, clean_values
 from icing_env import aircraft
 from icing_env.simulate import Fleet
 from icing_env.trim import trim
-from icing_env.types import ADVISORY, ESTIMATE, ESTIMATED_NAMES, SURFACES, TARGET
+from icing_env.types import ESTIMATE, ESTIMATED_NAMES, SURFACES, TARGET
 
 DT, AIRSPEED, ALTITUDE = 0.02, 72.0, 2200.0
 
@@ -34,11 +35,10 @@ def fly(
         fleet.current[i] = trimmed.current[0]
     fleet.state["seed"], fleet.state["temperature"] = np.arange(n) + 5, 263.0
     fleet.start()
-    pilot, target, advisory = autopilot.init(n), np.zeros(n, TARGET), np.zeros(n, ADVISORY)
+    pilot, target, advisory = autopilot.init(n), np.zeros(n, TARGET), free(n)
     for mode in ("pitch_mode", "speed_mode", "roll_mode"):
         target[mode] = 1
     target["altitude"], target["airspeed"] = ALTITUDE, AIRSPEED
-    advisory["alpha_limit"], advisory["bank_limit"], advisory["flap_limit"] = 0.2, 1.0, 0.6
     gains, held = autopilot.default_gains(), fleet.command.copy()
     airframe, tuning = airframe_from(parameters), default_tuning()
     observer, now = hinf.init(airframe, tuning, n, start), np.zeros(n, ESTIMATE)
