@@ -9,6 +9,7 @@ import pytest
 from flights import flight_data, lateral, longitudinal, with_channel
 
 from estimators.signals.data_checks import check
+from estimators.signals.flow_checks import _check_calm_side
 from icing_env import scenario as scenarios
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, read
@@ -94,3 +95,13 @@ def test_sound_records_in_turbulence_are_not_refused(sigma: float, airspeed: flo
     check(record)
     for start in (8.0, 28.0):
         check(record.take((record.time >= start) & (record.time < start + 20.0)))
+
+
+@pytest.mark.parametrize(("side", "unit"), [(0.3, "ft/s2"), (9.5, "g"), (0.42, ""), (1.0, "")])
+def test_ay_is_blamed_only_where_its_factor_is_near_a_unit(side, unit):
+    """0.42 is what a bank that errs, for the gyro's erection, made of a sound calm record."""
+    if unit:
+        with pytest.raises(InputError, match=unit):
+            _check_calm_side("record", side, 1.0)
+    else:
+        _check_calm_side("record", side, 1.0)

@@ -44,11 +44,11 @@ def factors(
     return [(float(k), abs(k - 1.0) > CLEAR * error and abs(k) > CLEAR * error) for k, error in pairs]
 
 
-def nearest_unit(factor: float, units: Mapping[str, float]) -> str:
-    """The unit whose ratio a factor is, "" if none."""
+def nearest_unit(factor: float, units: Mapping[str, float], within: float = NEAR) -> str:
+    """The unit whose ratio a factor is, by a relative difference of less than `within`; "" if none."""
     near = {unit: abs(factor / ratio - 1.0) for unit, ratio in units.items()}
     unit = min(near, key=near.__getitem__)
-    return unit if near[unit] < NEAR else ""
+    return unit if near[unit] < within else ""
 
 
 def line(x: FloatArray, y: FloatArray) -> tuple[float, float]:

@@ -24,7 +24,7 @@ from icing_env.record import FloatArray
 REACH = 0.3  # s either side over which flow angles are differentiated: the motion is slower, gusts and noise are not
 LIVELY = 0.2  # m/s2: rms of V alpha' or V beta' below which the flow angles say nothing
 EXPLAINED, CALM = 0.3, 0.93  # R2 from which the motion makes the flow's change, and from which nothing else does
-NEAR_UNIT = 0.3  # of the logarithm: farther from a unit an attitude that errs explains the factor of ay as well
+SIDE = 0.35  # of a unit's ratio: beyond it an attitude that errs explains the factor of ay as well
 IN_DEGREES = 0.4  # growth of lift by itself per unit of alpha
 FEET = 0.4  # side force per beta over lift per alpha: 0.07 (light aircraft) to 0.34 (fighters), 0.14 to 0.2 here
 FEEBLE = 0.25  # rad/s2 per rad of a surface: 4 to 16 on these aircraft
@@ -142,10 +142,8 @@ def _check_calm_side(where: str, side: float, bank: float) -> None:
     if unit and side > 1.2:
         raise InputError(f"{where}: column 'airspeed' looks like {unit}: bank turns the flow {bank:.2f} times "
                          "too little")  # fmt: skip
-    ratios = {"": 1.0, "g": G0, "ft/s2": 0.3048}
-    unit = min(ratios, key=lambda name: abs(np.log(max(side, 1e-6) / ratios[name])))
-    near = unit and abs(np.log(max(side, 1e-6) / ratios[unit])) < NEAR_UNIT
-    if near and 0.7 < bank < 1.4:
+    unit = nearest_unit(side, {"g": G0, "ft/s2": 0.3048}, SIDE)
+    if unit and 0.7 < bank < 1.4:
         raise InputError(f"{where}: column 'ay' looks like {unit}: beta changes at {side:.2g} of it")
 
 
