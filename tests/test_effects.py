@@ -14,17 +14,13 @@ from plant import fleet_at
 
 from icing_env.aircraft import broadcast, changed, load
 from icing_env.effects import LIBRARY, get, parse, with_effects
-from icing_env.effects.effect import Component, Effect
+from icing_env.effects.effect import ENTERS_AT, Component, Effect
 from icing_env.errors import InputError
 from icing_env.parameters import PARAMETERS
 from icing_env.simulate import Fleet
 from icing_env.trim import trim
 from icing_env.types import MEASUREMENT
 
-ENTRY_POINTS = {
-    "x_force", "y_force", "z_force", "rolling_moment", "pitching_moment", "yawing_moment", "propulsion", "mass",
-    "elevator_path", "aileron_path", "rudder_path", "wind", *(f"sensor:{name}" for name in MEASUREMENT.names),
-}  # fmt: skip
 EFFECTS = pytest.mark.parametrize("effect", LIBRARY.values(), ids=LIBRARY)
 # an aircraft on which nothing is zero or switched off that an effect could scale
 AIRCRAFT = changed(load(), turbulence_sigma_w=0.5)
@@ -110,7 +106,7 @@ def test_one_value_per_row_is_each_row_with_its_value(effect: Effect) -> None:
 @EFFECTS
 def test_what_an_effect_says_of_itself(effect: Effect) -> None:
     assert effect.component in get_args(Component)
-    assert effect.enters_at and set(effect.enters_at) <= ENTRY_POINTS
+    assert effect.enters_at and set(effect.enters_at) <= set(ENTERS_AT)
     assert effect.description and "\n" not in effect.description and not effect.description.endswith(".")
     assert effect.source
     assert any(p.typical != p.neutral for p in effect.parameters)

@@ -15,7 +15,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from icing_env.types import MEASUREMENT_FIELDS
+
 Component = Literal["aerodynamics", "propulsion", "mass", "actuator", "sensor", "environment"]
+# Where a diagnosis sees an effect enter: forces and moments, engines, mass, the way to each surface, instruments, air.
+ENTERS_AT = (
+    "x_force", "y_force", "z_force", "rolling_moment", "pitching_moment", "yawing_moment", "propulsion", "mass",
+    "elevator_path", "aileron_path", "rudder_path", "wind", *(f"sensor:{name}" for name, _, _ in MEASUREMENT_FIELDS),
+)  # fmt: skip
 Values = Mapping[str, float | NDArray[np.float64]]
 
 
@@ -38,7 +45,7 @@ class Effect:
     Attributes:
         name: as on the command line and in a diagnosis.
         component: where in the aircraft it lives.
-        enters_at: where a diagnosis sees it enter (the components of a diagnosis).
+        enters_at: of ENTERS_AT, the components of a diagnosis.
         description, source: for people.
         parameters: its numbers.
         apply: changes a PARAMETERS array in place.

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
+from functools import wraps
 from inspect import cleandoc
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,25 @@ def verb(name: str, example: str, **settings: Any) -> Callable[[Function], click
         return click.command(name, help=text, **settings)(function)
 
     return decorate
+
+
+def own_effects(function: Function) -> Function:
+    """Add --effects-from to a verb: effects of the user's own are in the library when its function runs.
+
+    What installed packages announce is there too; the function itself receives nothing of this.
+    """
+
+    @wraps(function)
+    def prepared(*args: Any, effects_from: tuple[Path, ...], **options: Any) -> Any:
+        from icing_env.effects import own
+
+        own.from_packages()
+        for path in effects_from:
+            own.from_file(path)
+        return function(*args, **options)
+
+    return click.option("--effects-from", multiple=True, metavar="FILE.py", type=click.Path(path_type=Path),
+                        help="Effects of your own, as in examples/own_effect.py. May be repeated.")(prepared)
 
 
 def plain(value: Any) -> Any:

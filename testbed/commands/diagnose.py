@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from testbed.commands.common import print_json, print_table, verb
+from testbed.commands.common import own_effects, print_json, print_table, verb
 
 if TYPE_CHECKING:
     from icing_env.record import FlightRecord
@@ -28,6 +28,7 @@ RECORDS = click.Path(path_type=Path)
 @click.option("--without", multiple=True, metavar="EFFECT", help="Leave an effect out of the library. May be repeated.")
 @click.option("--out", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
               help="Write diagnosis.json and report.html there.")  # fmt: skip
+@own_effects
 def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tuple[Path, ...],
             without: tuple[str, ...], out: Path | None, as_json: bool, seed: int) -> None:
     """Say where the model and the aircraft that flew RECORD part, and which unmodelled effect causes it.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from testbed.commands.common import print_json, print_table, verb
+from testbed.commands.common import own_effects, print_json, print_table, verb
 
 if TYPE_CHECKING:
     from icing_env.effects.effect import Effect, Parameter
@@ -17,6 +17,7 @@ def as_record(effect: Effect) -> dict[str, Any]:
 
 
 @verb("effects", "icing effects\nicing effects --json | jq '.[].name'")
+@own_effects
 def command(as_json: bool, seed: int) -> None:
     """List the ways in which an aircraft may differ from its model.
 

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import click
 
-from testbed.commands.common import print_json, print_table, verb
+from testbed.commands.common import own_effects, print_json, print_table, verb
 
 
-@verb("fly", "icing fly clear_air --seed 1 --out a.csv\nicing fly stratiform --effect tail_ice:eta=0.1")
+@verb("fly", "icing fly clear_air --seed 1 --out a.csv\nicing fly stratiform --effect tail_ice:eta=0.1\n"
+      "icing fly clear_air --effect wing_camera --effects-from examples/own_effect.py")
 @click.argument("scenario")
 @click.option("--controller", default="autopilot", show_default=True, help="Who flies.")
 @click.option("--effect", "effects", multiple=True, metavar="NAME[:PARAM=VALUE,...]",
@@ -19,6 +20,7 @@ from testbed.commands.common import print_json, print_table, verb
 @click.option("--rate", type=float, help="Samples per second in the record; 50 if omitted.")
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path),
               help="Record to write (.csv or .parquet); the truth goes beside it as NAME.truth.csv.")
+@own_effects
 def command(scenario: str, controller: str, effects: tuple[str, ...], duration: float | None, no_protection: bool,
             rate: float | None, out: Path | None, as_json: bool, seed: int) -> None:
     """Fly SCENARIO (a name, or the path of a .toml) and write the flight record.
