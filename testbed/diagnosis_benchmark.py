@@ -22,6 +22,7 @@ from testbed.withheld.draw import DEVELOPMENT_SEED
 from testbed.withheld.files import read_json, tampered, write_text
 from testbed.withheld.generate import generate
 from testbed.withheld.manoeuvres import DIAGNOSED
+from testbed.withheld.refly import refly
 from testbed.withheld.score import score
 
 QUICK, FULL = 150, 2400
@@ -32,10 +33,10 @@ Progress = Callable[[str], None]
 
 
 def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Progress) -> dict[str, Any]:
-    """Draw (or finish drawing) a set in `out`, diagnose every case, score.
+    """Draw (or finish drawing) a set in `out`, diagnose every case, fly the answers again, score.
 
     Args:
-        out: folder of records, keys, manifest and answers; what it holds already is kept.
+        out: folder of records, keys, manifest, answers and answers flown again; what it holds already is kept.
         cases: how many.
         seed: added to the development seed; None lets the operating system choose (a sealed set).
         workers: processes, for flights and diagnoses.
@@ -46,8 +47,9 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
     """
     committed = _drawn(out, cases, seed, workers, progress)
     _solve(out, sorted(committed["cases"]), workers, progress)
+    refly(out / "answers", out / "keys", out / "refly", workers, progress)
     progress("scoring")
-    found = score(out / "answers", out / "keys")
+    found = score(out / "answers", out / "keys", out / "refly")
     return found | {"set": "development" if seed is not None else "sealed",
                     "sources": committed["sources"]}  # fmt: skip
 
@@ -135,7 +137,9 @@ def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[s
     headers = {"figure": "left", "all": "right", "95 %": "left", "other form": "right", "permuted": "right"}
     names = ("cases", "failed", "identifiable_singles", "top1", "top3", "null_false_alarm", "pair_exact_set",
              "unknown_auroc_5_to_8", "unknown_auroc_above_8", "unknown_tpr_at_5_fpr", "where_f1", "ece", "coverage95",
-             "mean_set_size", "parameter_coverage95", "closure_median", "closure_p10", "seconds_per_case")  # fmt: skip
+             "mean_set_size", "parameter_coverage95", "closure_median", "closure_p10", "oracle_fraction",
+             "closure_own_median", "closure_own_p10", "oracle_fraction_own", "closure_told_median",
+             "seconds_per_case")  # fmt: skip
 
     def text(value: Any) -> str:
         return "-" if value is None else f"{value}" if isinstance(value, int) else f"{value:.3f}"

@@ -18,7 +18,9 @@ NAMES = [f"effect_{i}" for i in range(20)]
 def key(tier: str, parts: list[str], sigma: float, none: float = 20.0, pair: float = 10.0, **changes) -> dict:
     return {"tier": tier, "sigma_w": sigma, "effects": parts, "forms": ["same"] * len(parts), "D_none": none,
             "parameters": {n: {"size": 1.0} for n in parts}, "where": [f"place_{n}" for n in parts], "D_pair": pair,
-            "D": {n: 0.0 if n in parts else 15.0 for n in NAMES}, "salt": "x"} | changes  # fmt: skip
+            "D": {n: 0.0 if n in parts else 15.0 for n in NAMES}, "salt": "x",
+            "held_out": {"before": 0.5, "oracle": 0.1, "spread": 0.2, "own_before": 0.5, "own_oracle": 0.1,
+                         "noise": 0.1}} | changes  # fmt: skip
 
 
 def answer(parts: list[str], unknown: bool = False, p: float = 0.97, near: tuple[str, ...] = ()) -> dict:
@@ -57,9 +59,9 @@ def test_right_answers_score_right(perfect):
     for name in ("top1", "top3", "pair_exact_set", "unknown_auroc_above_8", "where_f1", "coverage95",
                  "mean_set_size", "parameter_coverage95", "unknown_tpr_at_5_fpr"):  # fmt: skip
         assert found[name] == 1.0, name
-    assert found["null_false_alarm"] == 0.0 and found["closure_median"] == 0.9 and found["seconds_per_case"] == 2.0
+    assert found["null_false_alarm"] == 0.0 and found["closure_told_median"] == 0.9 and found["seconds_per_case"] == 2.0
     assert found["top1_by_gust"] == {"0": 1.0, "0.5": 1.0, "1.5": 1.0}
-    assert found["unknown_auroc_5_to_8"] is None and found["oracle_fraction"] is None
+    assert found["unknown_auroc_5_to_8"] is None and found["closure_median"] is None
     assert found["intervals95"]["top1"] == [1.0, 1.0]
     assert {"cases", "top1", "by_tier", "mismatched_form", "baselines", "ece"} <= set(found)
 
@@ -93,6 +95,21 @@ def test_a_refused_record_is_wrong_and_counted():
     assert case["alarm"] and case["failed"] and not case["top3"] and not case["covered"]
 
 
+def test_closure_is_that_of_the_answer_flown_again_and_counts_where_there_is_a_gap(tmp_path):
+    held = {"before": 1.0, "oracle": 0.2, "spread": 0.5, "own_before": 0.8, "own_oracle": 0.0, "noise": 0.1}
+    small = held | {"before": 0.4, "own_before": 0.05}
+    pairs = [(answer(["effect_1"]), key("single", ["effect_1"], 0.0, held_out=h)) for h in (held, held, small)]
+    folders = write(tmp_path, pairs)
+    (tmp_path / "refly").mkdir()
+    for name, after, own in (("c000", 0.2, 0.0), ("c001", 0.6, 0.4), ("c002", 0.0, 0.0)):
+        (tmp_path / "refly" / f"{name}.json").write_text(json.dumps({"after": after, "own_after": own}))
+    found = score.score(*folders, tmp_path / "refly")
+    assert found["closure_median"] == pytest.approx(0.6)  # of 0.8 and 0.4; the third has no gap to close
+    assert found["oracle_fraction"] == pytest.approx(0.75)
+    assert found["closure_own_median"] == pytest.approx(0.75) and found["oracle_fraction_own"] == pytest.approx(0.75)
+    assert found["closure_told_median"] == 0.9
+
+
 def test_calibration_and_auroc_against_numbers_worked_out_by_hand():
     assert score.auroc([2.0, 3.0], [1.0, 2.0]) == pytest.approx(0.875)
     rng = np.random.default_rng(1)
@@ -117,6 +134,9 @@ def test_a_killed_run_goes_on_with_the_answers_it_has(perfect, tmp_path):
         "count": len(names), "development_seed": run.DEVELOPMENT_SEED}
     files.write_text(tmp_path / "manifest.json", json.dumps(sealed))
     (tmp_path / "keys").chmod(0)  # as a kill leaves it
+    (tmp_path / "refly").mkdir()
+    for name in names:  # as if flown again before
+        (tmp_path / "refly" / f"{name}.json").write_text('{"after": 0.1, "own_after": 0.1}')
     said: list[str] = []
     found = run.measure(tmp_path, len(names), 0, 1, said.append)
     assert found["top1"] == 1.0 and found["set"] == "development" and said == ["scoring"]

@@ -37,6 +37,15 @@ class Design:
     seed: int
     target: float = 0.0  # distance to the nearest pair of library effects that an unknown effect is scaled to
 
+    @property
+    def air(self) -> tuple[float, float, float]:
+        """Gust intensity, gust scale and noise level."""
+        return self.sigma, self.scale, self.level
+
+    def random(self, flight: int) -> np.random.Generator:
+        """What draws gust and noise of one of its flights."""
+        return np.random.default_rng(np.random.SeedSequence([self.seed, flight]))
+
 
 def designs(count: int, seed: int) -> list[Design]:
     """`count` cases in a random order; the same seed draws the same cases.
@@ -54,7 +63,7 @@ def designs(count: int, seed: int) -> list[Design]:
             parts = _parts(tier, k, order, rng)
             found.append(Design(
                 tier, parts, int(rng.integers(len(PLANS))), float(rng.choice(GAINS)), SIGMAS[k % 3],
-                float(rng.choice(SCALES)) if k % 3 else 1.0, float(rng.choice(LEVELS)), _baseline(rng),
+                float(rng.choice(SCALES)) if k % 3 else 1.0, float(rng.choice(LEVELS)), published_spread(rng),
                 int(rng.integers(2**62)), _target(rng) if tier == "unknown" else 0.0))
     return [found[i] for i in rng.permutation(len(found))]
 
@@ -89,7 +98,7 @@ def _target(rng: np.random.Generator) -> float:
     return float(low * (high / low) ** rng.random())
 
 
-def _baseline(rng: np.random.Generator) -> dict[str, float]:
+def published_spread(rng: np.random.Generator) -> dict[str, float]:
     """Factors on derivatives (5 %, one standard deviation, not beyond three) and on the mass (uniform)."""
     spread = {name: 1.0 + SPREAD * float(np.clip(rng.standard_normal(), -3.0, 3.0)) for name in DERIVATIVES}
     return {**spread, "mass": 1.0 + float(rng.uniform(-MASS_RANGE, MASS_RANGE))}

@@ -203,4 +203,8 @@ EFFECTS: tuple[Effect, ...] = (
     Effect("wind_shear", ("wind",), "gradient", 0.02, plus("shear"), plus("shear_bounded")),
     Effect("air_density", ("wind",), "change", 0.03, plus("density_factor"), plus("density_lapse")),
 )  # fmt: skip
-BY_NAME = {effect.name: effect for effect in EFFECTS}
+# Parameters of the library beside the one that is drawn, so that an answer that uses them can be flown.
+FURTHER = {"inertia_error": {"yy": times("inertia_yy"), "zz": times("inertia_zz")}}
+BY_NAME = {effect.name: effect for effect in EFFECTS} | {
+    f"{name}.{parameter}": Effect(f"{name}.{parameter}", (), parameter, 0.0, form, form)
+    for name, forms in FURTHER.items() for parameter, form in forms.items()}

@@ -78,3 +78,15 @@ def turbulence(manoeuvre: manoeuvres.Manoeuvre, sigma: float, scale: float, rng:
     """Gusts for a manoeuvre at its speed."""
     samples = len(manoeuvres.inputs(manoeuvre)) - 1
     return gusts.draw(samples, sigma, scale, manoeuvre.speed, PUBLISHED["tail_arm"], rng)
+
+
+def recorded(aircraft: Aircraft, manoeuvre: manoeuvres.Manoeuvre, gain: float, air: tuple[float, float, float],
+             rng: np.random.Generator) -> tuple[Flown, dict[str, NDArray]]:
+    """Fly and read a manoeuvre; `air`: gust intensity, gust scale, noise level.
+
+    Raises:
+        ArithmeticError: the aircraft cannot be flown.
+    """
+    sigma, scale, level = air
+    flown = fly(aircraft, manoeuvre, gain, turbulence(manoeuvre, sigma, scale, rng))
+    return flown, instruments.read(flown.channels, level, rng)

@@ -15,19 +15,21 @@ from dataclasses import asdict
 from itertools import groupby
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from testbed.withheld import files, instruments, numbers
+from testbed.withheld import files, numbers
 from testbed.withheld.draw import Design, designs
-from testbed.withheld.flights import CATALOGUE, Aircraft, fly, turbulence
+from testbed.withheld.flights import CATALOGUE, Aircraft, recorded
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
 from testbed.withheld.separation import Distances, Geometry, distances, geometry
+from testbed.withheld.windows import Held, closures, held
 
 TRIES, SMALLER = 8, 0.75  # an aircraft that departs gets a smaller effect
 SMALLEST_FACTOR = 0.01  # by which an unknown effect is scaled down
 Parts = tuple[tuple[str, str, float], ...]
+T = TypeVar("T")
 
 
 def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
@@ -53,8 +55,8 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
     names, seed, known = _roll(keys / "seed.json", cases, seed)
     jobs = [(name, design) for name, design in zip(names, designs(cases, seed), strict=True)
             if not ((records / name).is_dir() and (keys / f"{name}.json").is_file())]
-    groups = [list(group) for _, group in groupby(sorted(jobs, key=lambda job: _bank_of(job[1])),
-                                                  key=lambda job: _bank_of(job[1]))]
+    groups = [list(group) for _, group in groupby(sorted(jobs, key=lambda job: bank_of(job[1])),
+                                                  key=lambda job: bank_of(job[1]))]
     done = cases - len(jobs)
     if workers == 1:
         for group in groups:
@@ -90,22 +92,19 @@ def _roll(path: Path, cases: int, seed: int | None) -> tuple[list[str], int, boo
     return names, seed, given
 
 
-def _bank_of(design: Design) -> tuple[int, float]:
+def bank_of(design: Design) -> tuple[int, float]:
+    """Plan and gain of the inputs, on which the bank of departures depends."""
     return design.plan, design.gain
-
-
-def _geometry_of(design: Design) -> tuple[float, float, float]:
-    return design.sigma, design.scale, design.level
 
 
 def _make(group: list[tuple[str, Design]], records: Path, keys: Path) -> int:
     """Fly and write cases of one plan; cases that share gust and noise share their whitened bank."""
-    group = sorted(group, key=lambda job: _geometry_of(job[1]))
-    for _, same in groupby(group, key=lambda job: _geometry_of(job[1])):
+    group = sorted(group, key=lambda job: job[1].air)
+    for _, same in groupby(group, key=lambda job: job[1].air):
         shape: Geometry | None = None
         for name, design in same:
             if shape is None and design.parts:
-                shape = geometry(design.plan, design.gain, design.sigma, design.scale, design.level)
+                shape = geometry(*bank_of(design), *design.air)
             texts, key = make_case(name, design, shape)
             files.write_text(keys / f"{name}.json", json.dumps(key, indent=1))
             files.write_case(records / name, texts)
@@ -120,12 +119,20 @@ def make_case(name: str, design: Design, shape: Geometry | None) -> tuple[dict[s
         design: what to fly.
         shape: where distances are measured; None for a case without effects.
     """
-    parts = list(design.parts)
+    return smaller_until(design.parts, lambda parts: _flown(name, design, parts, shape))
+
+
+def smaller_until(parts: Parts, made: Callable[[Parts], T]) -> T:
+    """What `made` gives of the effects at their sizes, or at smaller ones if an aircraft with them cannot be flown.
+
+    Raises:
+        ArithmeticError: no size can be flown.
+    """
     for _ in range(TRIES):
         try:
-            return _flown(name, design, tuple(parts), shape)
+            return made(parts)
         except ArithmeticError:
-            parts = [(effect, form, SMALLER * size) for effect, form, size in parts]
+            parts = tuple((effect, form, SMALLER * size) for effect, form, size in parts)
     raise ArithmeticError(f"no size of {[p[0] for p in parts]} can be flown")
 
 
@@ -138,13 +145,15 @@ def _flown(name: str, design: Design, parts: Parts,
             parts, found = _scaled(design, shape, parts, found)
     aircraft = Aircraft(design.baseline, parts)
     texts: dict[str, str] = {}
+    flights: list[Held] = []
     for i, manoeuvre in enumerate(PLANS[design.plan]):
-        rng = np.random.default_rng(np.random.SeedSequence([design.seed, i]))
-        flown = fly(aircraft, manoeuvre, design.gain, turbulence(manoeuvre, design.sigma, design.scale, rng))
-        read = instruments.read(flown.channels, design.level, rng)
+        flown, read = recorded(aircraft, manoeuvre, design.gain, design.air, design.random(i))
+        flights.append(held(flown, read))
         texts[f"{i + 1}.csv"] = files.record_text(read, flown.commands)
         texts[f"{i + 1}.toml"] = files.side_text(name, "diagnose" if i < DIAGNOSED else "held_out")
-    return texts, _key(name, design, parts, found)
+    closed = closures(design.baseline, parts, PLANS[design.plan][DIAGNOSED:], flights[DIAGNOSED:], design.gain,
+                      design.air)
+    return texts, _key(name, design, parts, found) | {"held_out": closed}
 
 
 def _scaled(design: Design, shape: Geometry, parts: Parts, found: Distances) -> tuple[Parts, Distances]:

@@ -85,10 +85,10 @@ def vanes(Y: NDArray, seen: NDArray, s: Mapping[str, float]) -> tuple[NDArray, N
     return low(alpha + boom, recorder), low(beta, recorder)
 
 
-def exact(Y: NDArray, seen: NDArray, s: Mapping[str, float]) -> dict[str, NDArray]:
-    """Every channel of FAST and SLOW at every sample, without noise, instruments wrong as `s` says."""
+def exact(Y: NDArray, seen: NDArray, s: Mapping[str, float], start: float = 0.0) -> dict[str, NDArray]:
+    """Every channel of FAST and SLOW, samples from `start` s on, without noise, instruments wrong as `s` says."""
     recorder = 1.0 - math.exp(-2.0 * math.pi * PUBLISHED["filter_frequency"] * pl.DT)
-    t = np.arange(len(Y)) * pl.DT
+    t = start + np.arange(len(Y)) * pl.DT
     speed = seen[:, pl.VT] * (1.0 + s.get("airspeed_alpha", 0.0) * seen[:, pl.ALPHA])
     speed = np.sqrt(np.maximum(speed**2 + 2.0 * s.get("pressure_airspeed", 0.0) * 72.0**2, 1.0))
     c = {"airspeed": (1.0 + s.get("scale_airspeed", 0.0)) * low(speed, gain(PUBLISHED["pitot_lag"]))}

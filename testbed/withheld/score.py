@@ -1,7 +1,8 @@
 """Score answers of `icing diagnose --json` against the keys of a sealed set, with json and NumPy alone.
 
-`python score.py ANSWERS KEYS`: two folders with one JSON file per case. Figures of the interface, with bootstrap 95 %
-intervals over cases. What counts as right is said in docs/benchmark_diagnosis.md.
+`python score.py ANSWERS KEYS [REFLY]`: folders with one JSON file per case, the third as `refly.py` writes it (without
+it, closure is null and the solver's own stands under `closure_told_median`). Figures of the interface, with bootstrap
+95 % intervals over cases. What counts as right is said in docs/benchmark_diagnosis.md.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ BINS, LOWEST, HIGHEST = 15, 0.02, 0.98
 Case = dict[str, Any]
 
 
-def load(answers: Path, keys: Path) -> list[Case]:
-    """A flat record of every answered case, ordered by name.
+def load(answers: Path, keys: Path, refly: Path | None = None) -> list[Case]:
+    """A flat record of every answered case, ordered by name; `refly`: gaps of the answers' models, where flown again.
 
     Raises:
         ValueError: an answer without a key, or none at all.
@@ -31,14 +32,19 @@ def load(answers: Path, keys: Path) -> list[Case]:
         key = keys / path.name
         if not key.is_file():
             raise ValueError(f"{path.name}: no key of that name in {keys}")
-        found.append(flat(json.loads(path.read_text()), json.loads(key.read_text())))
+        again = None if refly is None else refly / path.name
+        flown = json.loads(again.read_text()) if again is not None and again.is_file() else None
+        found.append(flat(json.loads(path.read_text()), json.loads(key.read_text()), flown))
     if not found:
         raise ValueError(f"no answers in {answers}")
     return found
 
 
-def flat(answer: dict[str, Any], key: dict[str, Any]) -> Case:
-    """What the figures need of one answer and its key. An answer {"error": ...} is wrong everywhere."""
+def flat(answer: dict[str, Any], key: dict[str, Any], flown: dict[str, Any] | None = None) -> Case:
+    """What the figures need of one answer and its key. An answer {"error": ...} is wrong everywhere.
+
+    `flown`: gaps on held-out records of the answer's model, by the generator's plant.
+    """
     hypotheses = sorted(answer.get("hypotheses", []), key=lambda h: -h["probability"])
     truth = _truth(key)
     listed = [(frozenset(h["effects"]), bool(h["unknown"])) for h in hypotheses]
@@ -59,10 +65,27 @@ def flat(answer: dict[str, Any], key: dict[str, Any]) -> Case:
         "p_unknown": sum(h["probability"] for h in hypotheses if h["unknown"]),
         "p_truth": sum(h["probability"] for h in hypotheses if _label(h) == truth),
         "inclusion": [(p, name in key["effects"]) for name, p in sorted(inclusion.items())],
-        "covered": truth in told, "size": len(told), "closure": held.get("closure"),
+        "covered": truth in told, "size": len(told), "closure_told": held.get("closure"), **_closures(key, flown),
         "seen": frozenset(c for c, p in places.items() if p >= 0.5), "where": frozenset(key["where"]),
         "interval": _interval(answer, key), "seconds": answer.get("seconds"),
     }  # fmt: skip
+
+
+def _closures(key: dict[str, Any], flown: dict[str, Any] | None) -> dict[str, tuple[float, float] | None]:
+    """Closure of the answer and of the truth; None where not flown again or where there is no gap to close.
+
+    `published`: from the published aircraft, a gap being what exceeds that of the spread; `own`: from the aircraft with
+    its own spread, a gap being what exceeds noise and gust.
+    """
+    found: dict[str, tuple[float, float] | None] = {"published": None, "own": None}
+    if flown is None:
+        return found
+    held = key["held_out"]
+    for kind, least, prefix in (("published", "spread", ""), ("own", "noise", "own_")):
+        before = held[f"{prefix}before"]
+        if before > held[least]:
+            found[kind] = (1.0 - flown[f"{prefix}after"] / before, 1.0 - held[f"{prefix}oracle"] / before)
+    return found
 
 
 def _truth(key: dict[str, Any]) -> tuple[frozenset[str], bool]:
@@ -161,7 +184,7 @@ def figures(cases: Sequence[Case]) -> dict[str, Any]:
     clear = [c for c in cases if c["identifiable"]]
     nulls = [c for c in cases if c["tier"] == "null"]
     beyond = _unknown(cases, APART, math.inf)
-    closures = [c["closure"] for c in cases if c["tier"] in ("single", "pair") and c["closure"] is not None]
+    closures = [c["closure_told"] for c in cases if c["tier"] in ("single", "pair") and c["closure_told"] is not None]
     seconds = [c["seconds"] for c in cases if c["seconds"] is not None]
     return {
         "cases": len(cases), "failed": sum(c["failed"] for c in cases), "identifiable_singles": len(clear),
@@ -177,10 +200,20 @@ def figures(cases: Sequence[Case]) -> dict[str, Any]:
         "mean_set_size": share([c["size"] for c in cases if not c["failed"]]),
         "parameter_coverage95": share([c["interval"] for c in cases]),
         "log_score": float(np.mean([-math.log(max(c["p_truth"], 1e-6)) for c in cases])) if cases else None,
-        "closure_median": float(np.median(closures)) if closures else None,
-        "closure_p10": float(np.quantile(closures, 0.1)) if closures else None, "oracle_fraction": None,
+        **_closed(cases, "published", ""), **_closed(cases, "own", "_own"),
+        "closure_told_median": float(np.median(closures)) if closures else None,
         "seconds_per_case": float(np.mean(seconds)) if seconds else None,
     }  # fmt: skip
+
+
+def _closed(cases: Sequence[Case], kind: str, suffix: str) -> dict[str, float | None]:
+    """Median and tenth percentile of the closure of singles and pairs, and the median over that of the truth."""
+    found = np.array([c[kind] for c in cases if c[kind] is not None])
+    names = (f"closure{suffix}_median", f"closure{suffix}_p10", f"oracle_fraction{suffix}")
+    if not len(found):
+        return dict.fromkeys(names)
+    told, true = np.median(found, axis=0)
+    return dict(zip(names, (float(told), float(np.quantile(found[:, 0], 0.1)), float(told / true)), strict=True))
 
 
 def intervals(cases: Sequence[Case], repeats: int = 200) -> dict[str, list[float]]:
@@ -224,9 +257,9 @@ def baselines(answers: Path, keys: Path, cases: Sequence[Case]) -> dict[str, Any
     return {"permuted_keys": figures(permuted), "always_no_gap": figures(always)}
 
 
-def score(answers: Path, keys: Path) -> dict[str, Any]:
+def score(answers: Path, keys: Path, refly: Path | None = None) -> dict[str, Any]:
     """Every figure of the interface, intervals, tiers, mismatched forms (nulls and unknown included) and baselines."""
-    cases = load(answers, keys)
+    cases = load(answers, keys, refly)
     mismatched = [c for c in cases if c["tier"] in ("null", "unknown") or c["other"]]
     return {**figures(cases), "intervals95": intervals(cases), "by_tier": by_tier(cases),
             "mismatched_form": {**figures(mismatched), "intervals95": intervals(mismatched)},
@@ -234,4 +267,4 @@ def score(answers: Path, keys: Path) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    print(json.dumps(score(Path(sys.argv[1]), Path(sys.argv[2])), indent=2))
+    print(json.dumps(score(*(Path(folder) for folder in sys.argv[1:])), indent=2))

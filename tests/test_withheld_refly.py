@@ -1,0 +1,74 @@
+"""Closure by the generator's plant: the truth closes what its form can, nothing closes nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from testbed.withheld import draw, generate, refly, windows
+from testbed.withheld.effects import BY_NAME
+from testbed.withheld.flights import Aircraft, recorded
+from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
+
+DESIGN = draw.Design("single", (), 0, 1.0, 0.5, 1.3, 1.0, {"Cl_p": 1.05, "Cm_alpha": 0.95}, 7)
+PARTS = {"same": (("elevator_power", "same", -0.2),), "other": (("alpha_bias", "other", 0.02),)}
+
+
+@pytest.fixture(scope="module", params=sorted(PARTS))
+def key(request) -> dict:
+    return generate.make_case("a", replace(DESIGN, parts=PARTS[request.param]), None)[1]
+
+
+def answer(name: str, **values: float) -> dict:
+    told = {p: {"estimate": v, "low95": v, "high95": v, "unit": "1"} for p, v in values.items()}
+    return {"verdict": "explained", "hypotheses": [{"effects": [], "unknown": False, "probability": 0.6},
+                                                   {"effects": [name], "unknown": False, "probability": 0.4}],
+            "effects": [{"name": name, "parameters": told}]}  # fmt: skip
+
+
+def test_the_truth_closes_the_gap_and_another_effect_does_not(key):
+    held, (name,) = key["held_out"], key["effects"]
+    (parameter, size), = key["parameters"][name].items()
+    right = refly.flown_again(answer(name, **{parameter: size}), key)
+    assert right["own_after"] < 0.3 * held["own_before"] and right["after"] < held["before"]
+    if key["forms"] == ["same"]:  # then the answer is the oracle
+        assert right["after"] == pytest.approx(held["oracle"])
+        assert right["own_after"] == pytest.approx(held["own_oracle"])
+    wrong = refly.flown_again(answer(name, **{parameter: -size}), key)
+    assert wrong["own_after"] > held["own_before"]
+
+
+def test_an_answer_without_effects_leaves_the_gap_as_it_was(key):
+    both = [{"effects": ["tail_ice"], "unknown": True, "probability": 1.0}]
+    for silent in ({"verdict": "no_gap", "hypotheses": [], "effects": []}, {"error": "refused"},
+                   {"verdict": "unknown", "hypotheses": both, "effects": []}):
+        found = refly.flown_again(silent, key)
+        assert found["after"] == pytest.approx(key["held_out"]["before"])
+        assert found["own_after"] == pytest.approx(key["held_out"]["own_before"])
+        assert found["flown"] == {} and found["not_flown"] == []
+
+
+def test_every_parameter_of_the_library_can_be_flown():
+    from icing_env.effects import LIBRARY
+
+    for name, effect in LIBRARY.items():
+        parts, lacking = refly.told(answer(name, **{p.name: p.typical for p in effect.parameters}))
+        assert not lacking or name == "turbulence", name
+        for part, _, size in parts:
+            assert BY_NAME[part].same(size) is not None
+    assert refly.told(answer("made_up", size=1.0)) == ((), ["made_up.size"])
+
+
+def test_noise_alone_is_no_gap_and_the_start_is_fitted():
+    manoeuvre, air = PLANS[0][DIAGNOSED], (0.5, 1.0, 1.0)
+    own, noise = windows.own_noise((manoeuvre,), 1.0, air)
+    flight = windows.held(*recorded(Aircraft(), manoeuvre, 1.0, air, np.random.default_rng(99)))
+    assert windows.gap_of(Aircraft(), [flight], own) < 3.0 * noise < 0.3
+    calm = windows.held(*recorded(Aircraft(), manoeuvre, 1.0, (0.0, 1.0, 0.0), np.random.default_rng(1)))
+    still = np.sqrt(windows.residual_energy(Aircraft(), calm))
+    assert np.max(still) < 0.05  # instruments settle at the start of each window; nothing else differs
+    calm.states[:, windows.FREE] *= 1.02  # a worse guess of where windows begin
+    assert np.max(np.sqrt(windows.residual_energy(Aircraft(), calm))) < 0.1
+    assert windows.spread_gap((manoeuvre,), 0.5) > 2.0 * noise
