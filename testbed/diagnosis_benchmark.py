@@ -23,7 +23,7 @@ from testbed.withheld.files import read_json, tampered, write_text
 from testbed.withheld.generate import generate
 from testbed.withheld.manoeuvres import DIAGNOSED
 from testbed.withheld.refly import refly
-from testbed.withheld.score import score
+from testbed.withheld.score import DETECTABLE, identifiable, score
 
 QUICK, FULL = 150, 2400
 OPEN = 0o700  # of the key folder outside the diagnosis
@@ -32,7 +32,8 @@ LEDGER_COLUMNS = ("date", "set", "cases", "sources", "manifest", "top1", "top3",
 Progress = Callable[[str], None]
 
 
-def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Progress) -> dict[str, Any]:
+def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Progress,
+            without: bool = False) -> dict[str, Any]:
     """Draw (or finish drawing) a set in `out`, diagnose every case, fly the answers again, score.
 
     Args:
@@ -41,15 +42,20 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
         seed: added to the development seed; None lets the operating system choose (a sealed set).
         workers: processes, for flights and diagnoses.
         progress: told what is being done.
+        without: diagnose some single effects again, their own effect left out of the library.
 
     Raises:
         InputError: `out` holds another set, or its files are not those of its manifest.
     """
     committed = _drawn(out, cases, seed, workers, progress)
-    _solve(out, sorted(committed["cases"]), workers, progress)
+    _solve(out, "answers", dict.fromkeys(sorted(committed["cases"]), ()), workers, progress)
+    removed = removals(out / "keys") if without else {}
+    if without:  # only now, the ordinary answers being in, does the solver's side learn an effect of any case
+        write_text(out / "without.json", json.dumps(removed, indent=1))
+        _solve(out, "answers_without", {name: (effect,) for name, effect in removed.items()}, workers, progress)
     refly(out / "answers", out / "keys", out / "refly", workers, progress)
     progress("scoring")
-    found = score(out / "answers", out / "keys", out / "refly")
+    found = score(out / "answers", out / "keys", out / "refly", out / "answers_without")
     return found | {"set": "development" if seed is not None else "sealed",
                     "sources": committed["sources"]}  # fmt: skip
 
@@ -78,15 +84,32 @@ def _drawn(out: Path, cases: int, seed: int | None, workers: int, progress: Prog
     return committed | {"sources": source_hash("sim2real")}
 
 
-def _solve(out: Path, names: list[str], workers: int, progress: Progress) -> None:
-    answers = out / "answers"
+def removals(keys: Path) -> dict[str, str]:
+    """Single effects to leave out of the library, by case: every effect once at every gust level, where it was drawn.
+
+    Of several cases the identifiable come first, then the detectable; the others are left alone.
+    """
+    found: dict[tuple[str, float], tuple[bool, str]] = {}
+    for path in sorted(keys.glob("*.json")):
+        key = read_json(path)
+        if key.get("tier") != "single" or key["D_none"] < DETECTABLE:
+            continue
+        kind, clear = (key["effects"][0], key["sigma_w"]), identifiable(key)
+        if kind not in found or (clear and not found[kind][0]):
+            found[kind] = (clear, path.stem)
+    return {name: effect for (effect, _), (_, name) in sorted(found.items())}
+
+
+def _solve(out: Path, folder: str, jobs: dict[str, tuple[str, ...]], workers: int, progress: Progress) -> None:
+    """Answers to the cases of `jobs`, each with some effects left out of the library, into a folder of `out`."""
+    answers, names = out / folder, list(jobs)
     answers.mkdir(exist_ok=True)
     left = [name for name in names if not (answers / f"{name}.json").is_file()]
     with closed(out / "keys"), ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        running = {pool.submit(solve, out / "records" / name): name for name in left}
+        running = {pool.submit(solve, out / "records" / name, jobs[name]): name for name in left}
         for k, task in enumerate(as_completed(running), start=len(names) - len(left) + 1):
             write_text(answers / f"{running[task]}.json", json.dumps(task.result(), allow_nan=False))
-            progress(f"diagnosed {k} of {len(names)}")
+            progress(f"{folder}: {k} of {len(names)}")
 
 
 @contextmanager
@@ -99,8 +122,8 @@ def closed(folder: Path) -> Iterator[None]:
         folder.chmod(OPEN)
 
 
-def solve(case: Path) -> dict[str, Any]:
-    """The diagnosis of one case's records, as `icing diagnose --json` prints it.
+def solve(case: Path, without: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The diagnosis of one case's records, as `icing diagnose --json` prints it, some effects left out of the library.
 
     A record that is refused is an answer too: {"error": why}, wrong in every figure and counted as failed.
     """
@@ -110,9 +133,10 @@ def solve(case: Path) -> dict[str, Any]:
     from testbed.commands.common import plain
     from testbed.commands.diagnose import answer
 
-    records = [read(path) for path in sorted(case.glob("*.csv"))]
     try:
-        found: dict[str, Any] = plain(answer(diagnose(records[:DIAGNOSED], records[DIAGNOSED:])))
+        records = [read(path) for path in sorted(case.glob("*.csv"))]
+        told = diagnose(records[:DIAGNOSED], records[DIAGNOSED:], without=without)
+        found: dict[str, Any] = plain(answer(told))
     except InputError as error:
         return {"error": str(error)}
     return found
@@ -153,4 +177,6 @@ def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[s
     for gust, value in found["top1_by_gust"].items():
         rows.append([f"top1, sigma_w {gust} m/s", text(value), "",
                      text(found["mismatched_form"]["top1_by_gust"][gust]), ""])
+    rows += [[f"{tier}: right", text(entry["right"]), f"of {entry['cases']}", "", ""]
+             for tier, entry in found["by_tier"].items()]
     return [(f"diagnosis, {found['set']} set", headers, rows)]

@@ -152,3 +152,26 @@ def test_a_killed_run_goes_on_with_the_answers_it_has(perfect, tmp_path):
     (tmp_path / "keys" / f"{names[0]}.json").write_text("{}")
     with pytest.raises(run.InputError, match="not those of the manifest"):
         run.measure(tmp_path, len(names), 0, 1, said.append)
+
+
+def test_an_effect_left_out_of_the_library_is_unknown_or_a_near_rival(tmp_path):
+    near = dict.fromkeys(NAMES, 15.0) | {"effect_1": 0.0, "effect_2": 3.0}
+    told = [answer([], unknown=True), answer(["effect_2"]), answer(["effect_3"]), answer([]), {"error": "no"}]
+    answers, keys = write(tmp_path, [(a, key("single", ["effect_1"], 0.5, D=near)) for a in told])
+    found = score.withheld(answers, keys)
+    assert found["cases"] == 5 and found["right"] == pytest.approx(0.4) == found["right_by_gust"]["0.5"]
+    assert (found["unknown"], found["near_rival"], found["no_gap"]) == pytest.approx((0.2, 0.2, 0.2))
+    assert found["right_by_gust"]["0"] is None
+    assert score.score(answers, keys, None, answers)["by_tier"]["without"] == found
+    assert score.withheld(tmp_path / "none", keys) is None
+
+
+def test_every_effect_is_left_out_once_at_every_gust_an_identifiable_case_first(tmp_path):
+    blurred = dict.fromkeys(NAMES, 1.0)
+    drawn = [key("single", ["effect_1"], 0.0, D=blurred), key("single", ["effect_1"], 0.0),
+             key("single", ["effect_1"], 0.0), key("single", ["effect_1"], 1.5),
+             key("single", ["effect_2"], 0.0, none=2.0), key("single", ["effect_3"], 0.0, D=blurred),
+             key("pair", ["effect_4", "effect_5"], 0.0), key("null", [], 0.0)]  # fmt: skip
+    _, keys = write(tmp_path, [({}, k) for k in drawn])
+    (keys / "seed.json").write_text("{}")
+    assert run.removals(keys) == {"c001": "effect_1", "c003": "effect_1", "c005": "effect_3"}

@@ -33,10 +33,11 @@ icing benchmark diagnosis --quick --out out/withheld"""
               show_default=True, help="diagnosis: records, keys, answers; an interrupted run goes on from there.")
 @click.option("--ledger", type=click.Path(path_type=Path, dir_okay=False),
               help="diagnosis: append a line on this run to that file.")
+@click.option("--without", is_flag=True, help="diagnosis: also each effect in turn left out of the library.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="diagnosis: processes.")
 def command(name: str, quick: bool, weights: Path | None, figure: Path | None, encounters: int | None,
             only: str | None, cases: int | None, fresh_seed: bool, out: Path, ledger: Path | None, workers: int,
-            as_json: bool, seed: int) -> None:
+            without: bool, as_json: bool, seed: int) -> None:
     """Measure the testbed.
 
     `speed`: one aircraft and batches, with and without observer, one thread, beside JSBSim in the same run (if it is
@@ -58,7 +59,7 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
         _adaptation(quick, as_json)
         return
     if name == "diagnosis":
-        _diagnosis(quick, cases, None if fresh_seed else seed, out, ledger, workers, as_json)
+        _diagnosis(quick, cases, None if fresh_seed else seed, out, ledger, workers, without, as_json)
         return
     from testbed.characterisation.benchmark import draw, measure, tables
 
@@ -84,10 +85,11 @@ def _adaptation(quick: bool, as_json: bool) -> None:
 
 
 def _diagnosis(quick: bool, cases: int | None, seed: int | None, out: Path, ledger: Path | None, workers: int,
-               as_json: bool) -> None:
+               without: bool, as_json: bool) -> None:
     from testbed.diagnosis_benchmark import FULL, QUICK, enter_ledger, measure, tables
 
-    found = measure(out, cases or (QUICK if quick else FULL), seed, workers, lambda what: click.echo(what, err=True))
+    found = measure(out, cases or (QUICK if quick else FULL), seed, workers, lambda what: click.echo(what, err=True),
+                    without)
     if ledger is not None:
         enter_ledger(ledger, found, out)
     if as_json:

@@ -1,8 +1,9 @@
 """Score answers of `icing diagnose --json` against the keys of a sealed set, with json and NumPy alone.
 
-`python score.py ANSWERS KEYS [REFLY]`: folders with one JSON file per case, the third as `refly.py` writes it (without
-it, closure is null and the solver's own stands under `closure_told_median`). Figures of the interface, with bootstrap
-95 % intervals over cases. What counts as right is said in docs/benchmark_diagnosis.md.
+`python score.py ANSWERS KEYS [REFLY [WITHOUT]]`: folders with one JSON file per case. REFLY is what `refly.py` writes
+(without it, closure is null and the solver's own stands under `closure_told_median`), WITHOUT answers to single effects
+with the true effect left out of the library. Figures of the interface, with bootstrap 95 % intervals over cases. What
+counts as right is said in docs/benchmark_diagnosis.md.
 """
 
 from __future__ import annotations
@@ -245,6 +246,27 @@ def by_tier(cases: Sequence[Case]) -> dict[str, Any]:
     return tiers
 
 
+def withheld(answers: Path, keys: Path) -> dict[str, Any] | None:
+    """Answers to single effects that the library lacked: right where unknown or a rival truly within D of SAME."""
+    found = []
+    for path in sorted(answers.glob("*.json")):
+        answer, key = (json.loads((folder / path.name).read_text()) for folder in (answers, keys))
+        first = max(answer.get("hypotheses", []), key=lambda h: h["probability"], default=None)
+        found.append({
+            "sigma": key["sigma_w"], "unknown": answer.get("verdict") == "unknown", "named": answer.get("verdict"),
+            "near": (answer.get("verdict") == "explained" and first is not None and not first["unknown"]
+                     and len(first["effects"]) == 1 and key["D"].get(first["effects"][0], math.inf) < SAME)})
+    if not found:
+        return None
+
+    def right(rows: list[dict[str, Any]]) -> float | None:
+        return share([r["unknown"] or r["near"] for r in rows])
+
+    return {"cases": len(found), "right": right(found), "unknown": share([r["unknown"] for r in found]),
+            "near_rival": share([r["near"] for r in found]), "no_gap": share([r["named"] == "no_gap" for r in found]),
+            "right_by_gust": {f"{s:g}": right([r for r in found if r["sigma"] == s]) for s in (0.0, 0.5, 1.5)}}
+
+
 def baselines(answers: Path, keys: Path, cases: Sequence[Case]) -> dict[str, Any]:
     """What knowing nothing scores: the answers dealt to other cases, and "no gap" always."""
     found = sorted(answers.glob("*.json"))
@@ -257,11 +279,13 @@ def baselines(answers: Path, keys: Path, cases: Sequence[Case]) -> dict[str, Any
     return {"permuted_keys": figures(permuted), "always_no_gap": figures(always)}
 
 
-def score(answers: Path, keys: Path, refly: Path | None = None) -> dict[str, Any]:
+def score(answers: Path, keys: Path, refly: Path | None = None, without: Path | None = None) -> dict[str, Any]:
     """Every figure of the interface, intervals, tiers, mismatched forms (nulls and unknown included) and baselines."""
     cases = load(answers, keys, refly)
     mismatched = [c for c in cases if c["tier"] in ("null", "unknown") or c["other"]]
-    return {**figures(cases), "intervals95": intervals(cases), "by_tier": by_tier(cases),
+    left_out = None if without is None else withheld(without, keys)
+    tiers = by_tier(cases) | ({} if left_out is None else {"without": left_out})
+    return {**figures(cases), "intervals95": intervals(cases), "by_tier": tiers,
             "mismatched_form": {**figures(mismatched), "intervals95": intervals(mismatched)},
             "baselines": baselines(answers, keys, cases)}  # fmt: skip
 
