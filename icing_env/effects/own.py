@@ -1,4 +1,4 @@
-"""Effects of a user's own: from a Python file, from an installed package, or made on the spot; checked, then registered.
+"""Effects of a user's own: from a Python file, an installed package, or made on the spot; checked, then registered.
 
 A file is ordinary Python with one or more `Effect`s at its top level (examples/own_effect.py). A package announces its
 own under the entry-point group `icing.effects`, each entry naming an `Effect` or a module that has some.
