@@ -1,6 +1,7 @@
 """`icing benchmark`: how fast (`speed`), how well ice (`characterisation`) and gaps (`diagnosis`) are told.
 
-`protection`, `adaptation`: what they are worth.
+`protection`, `adaptation`: what they are worth; `policies`: what a gap does to a choice between controllers;
+`real_flight`: recorded flights diagnosed.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ import click
 from icing_env.errors import InputError, nearest
 from testbed.commands.common import print_json, print_table, verb
 
-NAMES = ("speed", "characterisation", "protection", "adaptation", "diagnosis")
+NAMES = ("speed", "characterisation", "protection", "adaptation", "diagnosis", "real_flight",
+         "policies")
 EXAMPLE = """icing benchmark speed --json
 icing benchmark characterisation --quick --figure out/reliability.png
 icing benchmark protection --encounters 200 --json
@@ -26,7 +28,7 @@ icing benchmark diagnosis --quick --out out/withheld"""
 @click.option("--weights", type=click.Path(path_type=Path), help="characterisation: folder of a training.")
 @click.option("--figure", type=click.Path(path_type=Path), help="characterisation: reliability curves as PNG.")
 @click.option("--encounters", type=click.IntRange(min=2), help="protection: encounters per row; 1000 if omitted.")
-@click.option("--only", metavar="A,B,...", help="protection: rows of these only, such as unprotected,surfaces.")
+@click.option("--only", metavar="A,B,...", help="protection: rows, real_flight, policies: cases; of these only.")
 @click.option("--cases", type=click.IntRange(min=8), help="diagnosis: how many; 2400 if omitted, 150 with --quick.")
 @click.option("--fresh-seed", is_flag=True, help="diagnosis: a sealed set, its seed from the operating system.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/withheld"),
@@ -61,6 +63,9 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
     if name == "diagnosis":
         _diagnosis(quick, cases, None if fresh_seed else seed, out, ledger, workers, without, as_json)
         return
+    if name in ("real_flight", "policies"):
+        _cases(name, only, as_json)
+        return
     from testbed.characterisation.benchmark import draw, measure, tables
 
     found = measure(quick, weights, lambda what: click.echo(f"{what} ...", err=True))
@@ -71,6 +76,22 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
         return
     for title, headers, rows in tables(found):
         print_table(title, headers, rows)
+
+
+def _cases(name: str, only: str | None, as_json: bool) -> None:
+    from importlib import import_module
+
+    study = import_module({"real_flight": "testbed.real_flight", "policies": "testbed.policy_study"}[name])
+    chosen = [case.strip() for case in only.split(",")] if only else []
+    found = study.measure(chosen, lambda what: click.echo(f"{what} ...", err=True))
+    if as_json:
+        print_json(found)
+        return
+    for case, (title, headers, rows) in zip(found, study.tables(found), strict=True):
+        print_table(title, headers, rows)
+        for sentence in case.sentences:
+            click.echo(sentence)
+        click.echo()
 
 
 def _adaptation(quick: bool, as_json: bool) -> None:

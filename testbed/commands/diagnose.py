@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,9 +29,11 @@ RECORDS = click.Path(path_type=Path)
 @click.option("--without", multiple=True, metavar="EFFECT", help="Leave an effect out of the library. May be repeated.")
 @click.option("--out", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
               help="Write diagnosis.json and report.html there.")  # fmt: skip
+@click.option("--policies", is_flag=True,
+              help="Also rank controllers by the simulator before and after, and on the aircraft as diagnosed.")
 @own_effects
 def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tuple[Path, ...],
-            without: tuple[str, ...], out: Path | None, as_json: bool, seed: int) -> None:
+            without: tuple[str, ...], out: Path | None, policies: bool, as_json: bool, seed: int) -> None:
     """Say where the model and the aircraft that flew RECORD part, and which unmodelled effect causes it.
 
     Records are .csv, .parquet or SIDPAC's .mat. Every effect of `icing effects` is tried, beside "no gap" and "nothing
@@ -43,7 +46,9 @@ def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tu
 
     with Console(stderr=True).status("reading the records") as status:
         found = diagnose(read_all(records), read_all(held_out), read_all(reference), without, seed, status.update)
-    result = answer(found)
+        result = answer(found)
+        if policies:
+            result["policies"] = rank_policies(result, seed, status.update)
     if out is not None:
         from testbed.diagnosis_report import write_report
 
@@ -52,8 +57,35 @@ def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tu
         print_json(result)
         return
     show(found, result)
+    if policies:
+        show_policies(result["policies"])
     if out is not None:
         click.echo(f"report: {out / 'report.html'}")
+
+
+def rank_policies(result: dict[str, Any], seed: int, say: Callable[[str], None]) -> dict[str, Any] | None:
+    """How the diagnosed effects change the ranking of controllers; None where no effect is diagnosed."""
+    from testbed import policy_gap
+
+    wide, diagnosed = policy_gap.intervals(result)
+    if not diagnosed:
+        return None
+    say("ranking controllers before and after")
+    return policy_gap.rank(wide, diagnosed, seed=seed, workers=2)
+
+
+def show_policies(found: dict[str, Any] | None) -> None:
+    """The table of ranks."""
+    from testbed import policy_gap
+
+    click.echo()
+    if found is None:
+        click.echo("Policies: no effect is diagnosed, so the simulator ranks controllers as before.")
+        return
+    print_table(f"{len(found['controllers'])} controllers ranked by the simulator, and on the aircraft as diagnosed",
+                *policy_gap.rows(found))
+    for sentence in policy_gap.sentences(found):
+        click.echo(sentence)
 
 
 def read_all(paths: tuple[Path, ...]) -> list[FlightRecord]:

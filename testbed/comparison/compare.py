@@ -58,7 +58,7 @@ def compare(suite: Suite, controllers: Sequence[str] | None = None, episodes: in
     who = [controller(name) for name in controllers or CONTROLLERS]
     count = episodes or suite.episodes
     asked = list(_rows(suite, who, count, seed))
-    flown = _in_order(asked, workers, progress)
+    flown = in_order(asked, workers, progress)
     rows = [{"controller": row.pilot.name, "kind": row.pilot.kind, "protection": row.protection,
              "scenario": row.scenario.name, "turbulence": row.label, "episodes": len(row.seeds),
              "metrics": summary(runs, row.pilot.kind == "learned")} for row, runs in zip(asked, flown, strict=True)]
@@ -73,7 +73,7 @@ def _rows(suite: Suite, who: Sequence[Controller], count: int, seed: int) -> Ite
                 yield Row(pilot, protection, label, scenario, seeds)
 
 
-def _in_order(asked: Sequence[Row], workers: int, progress: Progress | None
+def in_order(asked: Sequence[Row], workers: int, progress: Progress | None
               ) -> Iterator[list[dict[str, NDArray[np.float64]]]]:  # fmt: skip
     """Results of the rows in their order, flown here or by several processes."""
     if workers == 1:
