@@ -22,7 +22,8 @@ from icing_env.jit import bound
 def call_at(function: Any, *arrays: NDArray) -> Callable[[], Any]:
     """An `entry` of one argument, the table of these arrays, as a call without arguments.
 
-    The arrays are kept alive and must stay where they are: write into them.
+    The arrays are kept alive and must stay where they are: write into them. The call's `table` is there for other
+    compiled code.
 
     Raises:
         ValueError: an array is not contiguous in memory.
@@ -32,7 +33,7 @@ def call_at(function: Any, *arrays: NDArray) -> Callable[[], Any]:
             raise ValueError(f"an array of {array.dtype} is not contiguous")
     table = np.array([(array.ctypes.data, len(array)) for array in arrays], np.int64).reshape(-1)
     call = bound(function, table)
-    call.arrays = arrays  # type: ignore[attr-defined]
+    call.arrays, call.table = arrays, table  # type: ignore[attr-defined]
     return call
 
 

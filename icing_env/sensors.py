@@ -110,23 +110,41 @@ def filter_flow_and_inertial(x: Any, s: Any, c: Any, p: Any, airspeed: float, al
 
 
 @kernel
+def read_quietly(s: Any, m: Any, p: Any) -> None:
+    """Flow, inertial and surface channels without their noise: scale and bias."""
+    m.airspeed = (1.0 + p.scale_airspeed)*s.pitot + p.bias_airspeed
+    m.alpha = (1.0 + p.scale_alpha)*s.filtered_alpha + p.bias_alpha
+    m.beta = (1.0 + p.scale_beta)*s.filtered_beta + p.bias_beta
+    m.elevator = s.filtered_elevator + p.bias_elevator
+    m.p = (1.0 + p.scale_p)*s.filtered_p + p.bias_p
+    m.q = (1.0 + p.scale_q)*s.filtered_q + p.bias_q
+    m.r = (1.0 + p.scale_r)*s.filtered_r + p.bias_r
+    m.aileron = s.filtered_aileron + p.bias_aileron
+    m.ax = (1.0 + p.scale_ax)*s.filtered_ax + p.bias_ax
+    m.ay = (1.0 + p.scale_ay)*s.filtered_ay + p.bias_ay
+    m.az = (1.0 + p.scale_az)*s.filtered_az + p.bias_az
+    m.rudder = s.filtered_rudder + p.bias_rudder
+
+
+@kernel
 def read_fast(s: Any, m: Any, p: Any) -> None:
     """Flow, inertial and surface channels: scale, bias and noise (blocks 0 to 3 of the instrument stream)."""
+    read_quietly(s, m, p)
     n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, BLOCK[0])
-    m.airspeed = (1.0 + p.scale_airspeed)*s.pitot + p.bias_airspeed + p.noise_airspeed*n0
-    m.alpha = (1.0 + p.scale_alpha)*s.filtered_alpha + p.bias_alpha + p.noise_alpha*n1
-    m.beta = (1.0 + p.scale_beta)*s.filtered_beta + p.bias_beta + p.noise_beta*n2
-    m.elevator = s.filtered_elevator + p.bias_elevator + p.noise_elevator*n3
+    m.airspeed += p.noise_airspeed*n0
+    m.alpha += p.noise_alpha*n1
+    m.beta += p.noise_beta*n2
+    m.elevator += p.noise_elevator*n3
     n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, BLOCK[1])
-    m.p = (1.0 + p.scale_p)*s.filtered_p + p.bias_p + p.noise_p*n0
-    m.q = (1.0 + p.scale_q)*s.filtered_q + p.bias_q + p.noise_q*n1
-    m.r = (1.0 + p.scale_r)*s.filtered_r + p.bias_r + p.noise_r*n2
-    m.aileron = s.filtered_aileron + p.bias_aileron + p.noise_aileron*n3
+    m.p += p.noise_p*n0
+    m.q += p.noise_q*n1
+    m.r += p.noise_r*n2
+    m.aileron += p.noise_aileron*n3
     n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, BLOCK[2])
-    m.ax = (1.0 + p.scale_ax)*s.filtered_ax + p.bias_ax + p.noise_ax*n0
-    m.ay = (1.0 + p.scale_ay)*s.filtered_ay + p.bias_ay + p.noise_ay*n1
-    m.az = (1.0 + p.scale_az)*s.filtered_az + p.bias_az + p.noise_az*n2
-    m.rudder = s.filtered_rudder + p.bias_rudder + p.noise_rudder*n3
+    m.ax += p.noise_ax*n0
+    m.ay += p.noise_ay*n1
+    m.az += p.noise_az*n2
+    m.rudder += p.noise_rudder*n3
 
 
 @kernel

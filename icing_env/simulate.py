@@ -197,6 +197,13 @@ class Fleet:
         self._calls = [self._bound(k) for k in self._slices]
         return self._calls[0] if self._pool is None else self.step
 
+    def table(self) -> NDArray[np.int64]:
+        """Addresses of all arrays of a fleet that is not sliced, as `advance` and `advance_blocks` take them."""
+        if not self._calls:
+            self.bind()
+        (call,) = self._calls
+        return call.table  # type: ignore[attr-defined, no-any-return]
+
     def _bound(self, k: slice) -> Callable[[], None]:
         parameters = self.parameters if len(self.parameters) == 1 else self.parameters[k]
         arrays = (self.state[k], self.measurement[k], self.current[k], parameters, self.command[k], self.outcome[k],

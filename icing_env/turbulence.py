@@ -194,6 +194,38 @@ def advance_rotation(s: Any, p: Any, airspeed: float, dt: float, v_before: float
 
 
 @kernel
+def drift_translation(s: Any, airspeed: float, dt: float) -> None:
+    """What the filters of u, v, w become without new noise: their expected values."""
+    length_uv, length_w, _ratio = scales(s.altitude)
+    tau = airspeed * dt / length_uv
+    decay = math.exp(-tau)
+    s.dryden_u = decay * s.dryden_u
+    s.dryden_v2 = decay * (s.dryden_v2 + tau * s.dryden_v1)
+    s.dryden_v1 = decay * s.dryden_v1
+    if length_w != length_uv:
+        tau = airspeed * dt / length_w
+        decay = math.exp(-tau)
+    s.dryden_w2 = decay * (s.dryden_w2 + tau * s.dryden_w1)
+    s.dryden_w1 = decay * s.dryden_w1
+
+
+@kernel
+def drift_turbulence(s: Any, p: Any, airspeed: float, dt: float) -> None:
+    """`advance_turbulence` as a predictor sees it: nothing is drawn, the tail meets the gust later."""
+    v, before = max(airspeed, LOWEST_AIRSPEED), s.gust_w
+    drift_translation(s, v, dt)
+    put_translation(s)
+    reach_tail(s, p, v, before, dt)
+
+
+@kernel
+def reach_tail(s: Any, p: Any, airspeed: float, before: float, dt: float) -> None:
+    """The vertical gust at the tail behind its delay; `before`: gust_w at the start of the step."""
+    half = 0.5 * (s.gust_w_tail + before)  # the state of the Pade filter, from its last output and input
+    s.gust_w_tail = 2.0 * lag(half, before, s.gust_w, 2.0 * airspeed * dt / p.tail_arm) - s.gust_w
+
+
+@kernel
 def advance_turbulence(s: Any, p: Any, airspeed: float, dt: float) -> None:
     """Draw the gusts at the end of the step that begins now; within it they go there in straight lines.
 
@@ -218,8 +250,7 @@ def advance_turbulence(s: Any, p: Any, airspeed: float, dt: float) -> None:
         calm(s)
     add_discrete(s, p, v, dt)
     if delayed and p.tail_arm > 0.0:
-        half = 0.5 * (s.gust_w_tail + total_before)  # the state of the Pade filter, from its last output and input
-        s.gust_w_tail = 2.0 * lag(half, total_before, s.gust_w, 2.0 * v * dt / p.tail_arm) - s.gust_w
+        reach_tail(s, p, v, total_before, dt)
     else:
         s.gust_w_tail = s.gust_w
 

@@ -42,8 +42,8 @@ class Nuisance:
     only: str = ""  # where the power comes from, if it holds for such records alone
     follows: bool = True  # whether the model that all is flown about follows it
 
-    def apply(self, rows: NDArray, row: int, power_from: str, size: float = NUISANCE_STEP) -> None:
-        """Move one row of PARAMETERS by `size` standard deviations in this direction."""
+    def apply(self, rows: NDArray, row: int | slice, power_from: str, size: float | FloatArray = NUISANCE_STEP) -> None:
+        """Move one row of PARAMETERS (or several, by as many sizes) by `size` standard deviations in this direction."""
         if self.only and self.only != power_from:
             return
         step = size * self.factor

@@ -59,7 +59,7 @@ def gather(flight: Reconstruction, bank: Bank, gain: Gain | None = None) -> Evid
     """
     if gain is None:
         gain = choose_gain(flight, gains(flight, SIGMAS)).with_start()
-    base = innovations(flight, flight.parameters, gain.K)[:, 0].astype(float)
+    base = innovations(flight, flight.parameters, gain.K)[:, 0]
     factor = whitening(base[round(SETTLE / flight.dt) :], gain, flight)
     pushed = pushes(replace(flight, measured=predicted(flight, base)), bank)
     return compare(flight, parameter_rows(flight, bank), pushed, gain, factor)
@@ -145,7 +145,7 @@ def whitening(left: NDArray[np.floating], gain: Gain, flight: Reconstruction) ->
 
 def whiten(left: NDArray[np.floating], factor: FloatArray) -> FloatArray:
     """[N, rows, channels] whitened; what was not measured counts as zero."""
-    return np.nan_to_num(left.astype(np.float64)) @ factor.T
+    return np.where(np.isfinite(left), left, 0.0) @ factor.T
 
 
 def _spread(values: NDArray[np.floating]) -> float:

@@ -104,8 +104,7 @@ def fly(flight: Reconstruction, manoeuvre: Manoeuvre) -> Reconstruction:
     put(flown.fleet, at | {n: float(v[0]) for n, v in controls.items()})
     measured = np.empty_like(made.measured)
     measured[0] = flown.read()
-    for k in range(len(time) - 1):
-        measured[k + 1] = flown.step(k)
+    measured[1:] = flown.fly(len(time) - 1)[:, 0]
     absent: NDArray[np.bool_] = np.array([not flight.has(name) for name in MEASURED])
     measured[:, absent] = np.nan
     return replace(made, measured=measured, altitude=measured[:, MEASURED.index("altitude")].copy()

@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from icing_env.atmosphere import pressure
+from icing_env.jit import entry
 from icing_env.propulsion import power_available
 from icing_env.record import FloatArray
 from sim2real.channels import SURFACES
@@ -52,20 +54,35 @@ def follow(command: FloatArray, start: float, p: NDArray, surface: str, dt: floa
 
     The command of sample k acts during the step that ends there.
     """
-    n = len(p)
-    position, out = np.full(n, start), np.empty((len(command), n))
-    lag, rate = p[f"{surface}_lag"], p[f"{surface}_rate"]
-    low, high = p[f"{surface}_min"], p[f"{surface}_max"]
-    gear, offset = p[f"{surface}_gearing"], p[f"{surface}_offset"]
     cut = 1.0 - np.exp(-2.0 * np.pi * p["filter_frequency"] * dt)
-    share = 1.0 - np.exp(-dt / np.maximum(lag, 1e-3))
-    filtered = position.copy()
-    out[0] = filtered
-    for k in range(1, len(command)):
-        target = np.clip(gear * command[k] + offset, low, high)
-        position = position + np.clip((target - position) * share, -rate * dt, rate * dt)
-        filtered = filtered + cut * (position - filtered)
-        out[k] = filtered
+    share = 1.0 - np.exp(-dt / np.maximum(p[f"{surface}_lag"], 1e-3))
+    gear, offset, low, high, rate = (
+        np.ascontiguousarray(p[f"{surface}_{name}"]) for name in ("gearing", "offset", "min", "max", "rate"))
+    out = np.empty((len(command), len(p)))
+    _follow(command, start, gear, offset, low, high, rate * dt, share, cut, out)
+    return out
+
+
+@entry
+def _follow(command: Any, start: float, gear: Any, offset: Any, low: Any, high: Any, step: Any, share: Any, cut: Any,
+            out: Any) -> None:
+    """First-order lag with a limited step, then the low pass, for every row; `out`: [N, rows]."""
+    for i in range(out.shape[1]):
+        position = filtered = start
+        out[0, i] = start
+        for k in range(1, len(command)):
+            target = min(max(gear[i]*command[k] + offset[i], low[i]), high[i])
+            position += min(max((target - position)*share[i], -step[i]), step[i])
+            filtered += cut[i]*(position - filtered)
+            out[k, i] = filtered
+
+
+@entry
+def _full_power(altitude: Any, aircraft: Any) -> Any:
+    """Shaft power of one engine with its lever forward at each height [W]; `aircraft`: one PARAMETERS row."""
+    out = np.empty(len(altitude))
+    for k in range(len(altitude)):
+        out[k] = power_available(pressure(altitude[k]), aircraft[0])
     return out
 
 
@@ -73,8 +90,7 @@ def _engine_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple
     if flight.power_from != "torque":
         return []
     out = []
-    row: Any = flight.parameters[0]
-    full = np.array([power_available(pressure(float(h)), row) for h in flight.altitude])
+    full = _full_power(flight.altitude, flight.parameters)
     rows = _differing(parameters, ["spool_time"])
     share = 1.0 - np.exp(-flight.dt / parameters["spool_time"][rows])
     for side in ("left", "right"):
@@ -82,11 +98,11 @@ def _engine_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple
         if lever is None or np.ptp(lever) < STILL_LEVER:
             continue
         power = np.full(len(rows), flight.controls[f"power_{side}"][0])
+        wanted = full * np.clip(lever, 0.0, 1.0)
         found = np.empty((len(lever), len(rows)))
         found[0] = power
-        for k in range(1, len(lever)):
-            power = power + share * (full[k] * min(max(lever[k], 0.0), 1.0) - power)
-            found[k] = power
+        for j, s in enumerate(share):
+            found[1:, j] = lfilter([s], [1.0, s - 1.0], wanted[1:], zi=[(1.0 - s) * power[j]])[0]
         left = (flight.controls[f"power_{side}"][:, None] - found) / full[:, None]
         # the chart between lever and power is nobody's claim: a constant share and an offset are taken out
         out.append((_without_line(left, lever) / POWER_NOISE, rows))

@@ -19,26 +19,21 @@ from numpy.typing import NDArray
 from icing_env.frames import direction_cosines, to_body
 from icing_env.record import FloatArray
 from icing_env.simulate import Fleet
-from icing_env.types import MEASUREMENT, STATE
+from icing_env.types import STATE
+from sim2real.along import CONTROLS, SLOW_SURFACE, STATES, STILL, X, along, columns, read, turn
 from sim2real.channels import FED_BACK, MEASURED, SURFACES
 from sim2real.reconstruct import Reconstruction
 
-STATES = ("u", "v", "w", "p", "q", "r", "altitude", "alpha_downwash", "dryden_u", "dryden_v1", "dryden_v2",
-          "dryden_w1", "dryden_w2", "gust_u", "gust_v", "gust_w", "gust_w_tail", "pitot", "vane_alpha", "vane_beta",
-          *(f"filtered_{c}" for c in ("alpha", "beta", "p", "q", "r", "ax", "ay", "az")))  # fmt: skip
 ANGLES = ("phi", "theta")  # corrected through the quaternion
 TANGENT = (*STATES, *ANGLES)
-STILL = 1e-12  # m/s: gusts keep their states but draw nothing
-SLOW_SURFACE = 4.0  # a surface's lag in steps: it moves nearly in a straight line from sample to sample
-_STATE_COLUMN = {name: i for i, name in enumerate(STATE.names or ())}
-_MEASURED_COLUMN = {name: i for i, name in enumerate(MEASUREMENT.names or ())}
-_X = np.array([_STATE_COLUMN[name] for name in STATES])
 # over whole arrays the kernels' own text runs as plain NumPy
 _PLAIN_COSINES: Any
 _PLAIN_TO_BODY: Any
-_PLAIN_COSINES, _PLAIN_TO_BODY = (getattr(f, "py_func", f) for f in (direction_cosines, to_body))
-_E = np.array([_STATE_COLUMN[name] for name in ("e0", "e1", "e2", "e3")])
-_Y = np.array([_MEASURED_COLUMN[name] for name in MEASURED[:11]])
+_PLAIN_READ: Any
+_PLAIN_TURN: Any
+_PLAIN_COSINES, _PLAIN_TO_BODY, _PLAIN_READ, _PLAIN_TURN = (
+    getattr(f, "py_func", f) for f in (direction_cosines, to_body, read, turn))
+_E = columns(STATE, ("e0", "e1", "e2", "e3"))
 
 
 @dataclass(frozen=True)
@@ -58,8 +53,6 @@ class Predictor:
         self.flight, self.n = flight, len(parameters)
         self.fleet = Fleet(held(parameters, flight.dt), self.n, flight.dt, max(1, round(flight.dt / 0.02)))
         self.x = self.fleet.state.view(np.float64).reshape(self.n, -1)
-        self.y = self.fleet.measurement.view(np.float64).reshape(self.n, -1)
-        self._surfaces = [(s, self.fleet.state[s], self.fleet.command[s]) for s in SURFACES]
 
     def place(self, k: int) -> None:
         """Start every row at the measured state of sample `k` (a quarter of a second averaged)."""
@@ -69,59 +62,60 @@ class Predictor:
         """Put every row at the record's median state: the condition about which the plant is linearised."""
         start_state(self.flight, slice(None), self.fleet)
 
-    def step(self, k: int | NDArray[np.intp]) -> FloatArray:
-        """From sample k (one, or one per row) to the next with the recorded controls.
+    def fly(self, steps: int, first: int | NDArray[np.intp] = 0, gain: FloatArray | None = None,
+            pushes: tuple[Push, ...] = ()) -> FloatArray:
+        """Fly along the record from where the rows are placed.
+
+        Args:
+            steps: how many samples.
+            first: the sample at which they start, one or one per row.
+            gain: K of a `Gain` [steps, states, fed-back channels], or one per row [n, ...]; free flight if omitted.
+            pushes: generic discrepancies.
 
         Returns:
-            What the instruments should read [n, channels].
+            What the instruments should read [steps, n, channels]; with a gain measured less that, nan where nothing
+            was measured.
         """
-        controls, f = self.flight.controls, self.fleet
-        rest = 1.0 - _rk4_exponential(1.0 / SLOW_SURFACE)
-        for name, position, command in self._surfaces:
-            now, then = controls[name][k], controls[name][k + 1]
-            position[:] = now
-            command[:] = now + (then - now) / rest
-        f.state["flap"], f.command["flap"] = controls["flap"][k + 1], controls["flap"][k + 1]
-        for side in ("left", "right"):
-            f.state[f"power_{side}"] = controls[f"power_{side}"][k + 1]
-        f.step()
-        return self.read()
+        flight = self.flight
+        out = np.empty((steps, self.n, len(MEASURED)))
+        controls = np.column_stack([flight.controls[name] for name in CONTROLS])
+        start = np.full(self.n, first, np.intp) if isinstance(first, int) else np.asarray(first, np.intp)
+        K = np.zeros((0, 0, 0, 0)) if gain is None else gain[None] if gain.ndim == 3 else gain
+        share = np.mean(np.isfinite(flight.measured[:, :FED_BACK]), axis=0)
+        stretch = 1.0 / np.maximum(share, 1e-3)  # a sparse channel's share comes at once
+        forces = [(q.row, X[STATES.index(q.target)], q.series * flight.dt) for q in pushes if not q.sensor]
+        felt = [(q.row, MEASURED.index("a" + "xyz"["uvw".index(q.target)]), q.series) for q in pushes
+                if not q.sensor and q.target in "uvw"]  # fmt: skip
+        errors = felt + [(q.row, MEASURED.index(q.target), q.series) for q in pushes if q.sensor]
+        along(self.fleet.table(), controls, start, np.ascontiguousarray(flight.measured), stretch,
+              np.ascontiguousarray(np.swapaxes(K, 2, 3)), *_listed(forces), *_listed(errors), out)
+        return out
 
     def read(self) -> FloatArray:
-        """Predicted readings [n, channels of MEASURED]."""
+        """What the instruments should read [n, channels of MEASURED]."""
         out = np.empty((self.n, len(MEASURED)))
-        out[:, :11] = self.y[:, _Y]
-        out[:, 11] = self.fleet.state["altitude"]
-        s, p = self.fleet.state, self.fleet.parameters
-        per_power = p["propeller_efficiency"] / np.sqrt((s["u"] - s["gust_u"]) ** 2 + p["propeller_static_speed"] ** 2)
-        for j, side in enumerate(("left", "right")):
-            out[:, 12 + j] = p[f"thrust_factor_{side}"] * s[f"power_{side}"] * per_power
+        y, p = (a.view(np.float64).reshape(self.n, -1) for a in (self.fleet.measurement, self.fleet.parameters))
+        _PLAIN_READ(out.T, self.x.T, y.T, p.T)
         return out
 
     def correct(self, change: FloatArray) -> None:
         """Add `change` [n, TANGENT] to the states."""
-        self.x[:, _X] += change[:, : len(STATES)]
-        roll, pitch = change[:, -2], change[:, -1]
-        phi = self.fleet.measurement["phi"]
-        wy, wz = pitch * np.cos(phi), -pitch * np.sin(phi)
-        e = self.x[:, _E]
-        half = 0.5 * np.stack([-e[:, 1] * roll - e[:, 2] * wy - e[:, 3] * wz,
-                               e[:, 0] * roll + e[:, 2] * wz - e[:, 3] * wy,
-                               e[:, 0] * wy + e[:, 3] * roll - e[:, 1] * wz,
-                               e[:, 0] * wz + e[:, 1] * wy - e[:, 2] * roll], axis=1)  # fmt: skip
-        self.x[:, _E] = e + half
+        self.x[:, X] += change[:, : len(STATES)]
+        for row, phi, (roll, pitch) in zip(self.x, self.fleet.measurement["phi"], change[:, -2:], strict=True):
+            _PLAIN_TURN(row, phi, roll, pitch)
 
     def tangent(self) -> FloatArray:
         """States as a vector [n, TANGENT]."""
         e0, e1, e2, e3 = self.x[:, _E].T
         phi = np.arctan2(2.0 * (e0 * e1 + e2 * e3), 1.0 - 2.0 * (e1 * e1 + e2 * e2))
         theta = np.arcsin(np.clip(2.0 * (e0 * e2 - e1 * e3), -1.0, 1.0))
-        return np.column_stack([self.x[:, _X], phi, theta])
+        return np.column_stack([self.x[:, X], phi, theta])
 
 
-def _rk4_exponential(x: float) -> float:
-    """What the Runge-Kutta step makes of exp(-x)."""
-    return 1.0 - x + x**2 / 2.0 - x**3 / 6.0 + x**4 / 24.0
+def _listed(items: list[tuple[int, int, FloatArray]]) -> tuple[NDArray[np.intp], FloatArray]:
+    """(row, column) of each [items, 2] and their series [items, N]."""
+    at = np.array([item[:2] for item in items], np.intp).reshape(-1, 2)
+    return at, np.array([item[2] for item in items], np.float64) if items else np.zeros((0, 0))
 
 
 def held(parameters: NDArray, dt: float) -> NDArray:
@@ -136,7 +130,7 @@ def held(parameters: NDArray, dt: float) -> NDArray:
         out[f"{surface}_gearing"], out[f"{surface}_offset"] = 1.0, 0.0
     out["hinge_elevator_hold"] = out["hinge_aileron_hold"] = 1e12
     out["spool_time"] = 1e12
-    out["turbulence_sigma_w"], out["turbulence_tail_delay"] = STILL, 1.0
+    out["turbulence_sigma_w"], out["turbulence_tail_delay"] = 0.1 * STILL, 1.0
     return out
 
 
@@ -175,8 +169,8 @@ def put(fleet: Fleet, values: Mapping[str, float | FloatArray]) -> None:
 
 
 def innovations(flight: Reconstruction, parameters: NDArray, gain: FloatArray,
-                pushes: tuple[Push, ...] = ()) -> NDArray[np.float32]:
-    """Measured less predicted of every row [N-1, n, channels], float32; nan where nothing was measured.
+                pushes: tuple[Push, ...] = ()) -> FloatArray:
+    """Measured less predicted of every row [N-1, n, channels]; nan where nothing was measured.
 
     Args:
         flight: the record.
@@ -186,28 +180,4 @@ def innovations(flight: Reconstruction, parameters: NDArray, gain: FloatArray,
     """
     flown = Predictor(flight, parameters)
     flown.place(0)
-    steps = len(flight.time) - 1
-    out = np.empty((steps, flown.n, len(MEASURED)), dtype=np.float32)
-    present = np.isfinite(flight.measured)
-    stretch = 1.0 / np.maximum(np.mean(present[:, :FED_BACK], axis=0), 1e-3)  # a sparse channel's share comes at once
-    forces = [q for q in pushes if not q.sensor]
-    errors = [q for q in pushes if q.sensor]
-    f_row, f_col = np.array([q.row for q in forces], int), np.array([TANGENT.index(q.target) for q in forces], int)
-    f_series = np.array([q.series for q in forces]).reshape(len(forces), steps + 1)
-    felt = [(q.row, MEASURED.index("a" + "xyz"["uvw".index(q.target)]), q.series) for q in forces if q.target in "uvw"]
-    direct = felt + [(q.row, MEASURED.index(q.target), q.series) for q in errors]
-    d_row, d_col = np.array([d[0] for d in direct], int), np.array([d[1] for d in direct], int)
-    d_series = np.array([d[2] for d in direct]).reshape(len(direct), steps + 1)
-    for k in range(steps):
-        predicted = flown.step(k)
-        if direct:
-            predicted[d_row, d_col] += d_series[:, k + 1]
-        left = flight.measured[k + 1] - predicted
-        out[k] = left
-        fed = np.where(present[k + 1, :FED_BACK], left[:, :FED_BACK], 0.0) * stretch
-        now = min(k, gain.shape[-3] - 1)
-        change = fed @ gain[now].T if gain.ndim == 3 else np.einsum("nsc,nc->ns", gain[:, now], fed)
-        if forces:
-            change[f_row, f_col] += f_series[:, k + 1] * flight.dt
-        flown.correct(change)
-    return out
+    return flown.fly(len(flight.time) - 1, gain=gain, pushes=pushes)

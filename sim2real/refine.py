@@ -18,7 +18,7 @@ from scipy.special import logsumexp
 from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.attribution import Hypothesis, Posterior, normalised
-from sim2real.candidates import NUISANCE_STEP, Bank, pushes, shifted
+from sim2real.candidates import NUISANCE_STEP, Bank, pushes
 from sim2real.evidence import Evidence, compare, predicted
 from sim2real.generic import fit_unknown
 from sim2real.predictor import innovations
@@ -90,7 +90,7 @@ def _beside(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
     gram = np.zeros((first + count, first + count))
     for flight, evidence in zip(flights, evidences, strict=True):
         rows = _rows(flight, candidates, known.fit, point.sizes, steps, point.nuisances)
-        base = innovations(replace(flight, parameters=rows[:1]), rows[:1], evidence.gain.K)[:, 0].astype(float)
+        base = innovations(replace(flight, parameters=rows[:1]), rows[:1], evidence.gain.K)[:, 0]
         pushed = tuple(replace(q, row=first + j) for j, q in enumerate(
             pushes(replace(flight, measured=predicted(flight, base)), candidates)))
         rows = np.concatenate([rows, np.repeat(rows[:1], count)])
@@ -164,18 +164,16 @@ def _steps(fit: SetFit, sizes: FloatArray) -> FloatArray:
 def _rows(flight: Reconstruction, candidates: Bank, fit: SetFit, sizes: FloatArray, steps: FloatArray,
           nuisances: FloatArray) -> NDArray:
     """PARAMETERS: the set where it is fitted, then a step of each size, then a step of each nuisance."""
-    own = np.tile(nuisances, (1 + len(nuisances), 1))
-    own[1:] += NUISANCE_STEP * np.eye(len(nuisances))
-    models = np.concatenate([shifted(flight.parameters, candidates.nuisances, v, flight.power_from) for v in own])
-    moved = np.tile(sizes, (1 + len(sizes), 1))
-    moved[1:] += np.diag(steps)
-    out = [_with(models[:1], fit, s) for s in moved]
-    return np.concatenate([*out, _with(models[1:], fit, sizes)])
-
-
-def _with(rows: NDArray, fit: SetFit, sizes: FloatArray) -> NDArray:
-    return effects.with_effects(rows, {f.effect.name: {f.parameter.name: float(s)}
-                                       for f, s in zip(fit.families, sizes, strict=True)})  # fmt: skip
+    k, n = len(sizes), len(nuisances)
+    rows = np.repeat(flight.parameters, 1 + k + n)
+    for j, (direction, size) in enumerate(zip(candidates.nuisances, nuisances, strict=True)):
+        own = np.full(len(rows), size)
+        own[1 + k + j] += NUISANCE_STEP
+        direction.apply(rows, slice(None), flight.power_from, own)
+    moved = np.tile(sizes, (len(rows), 1))
+    moved[1 : 1 + k] += np.diag(steps)
+    return effects.with_effects(rows, {f.effect.name: {f.parameter.name: moved[:, m]}
+                                       for m, f in enumerate(fit.families)})  # fmt: skip
 
 
 def _corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior) -> Hypothesis:

@@ -68,9 +68,7 @@ def fly(flight: Reconstruction, parameters: NDArray, first: NDArray[np.intp], st
     if gusts is not None:
         flown.fleet.state["seed"] = np.arange(len(first), dtype=np.uint64) + np.uint64(gusts[1])
         flown.fleet.start()
-    out = np.empty((len(first), steps, len(COMPARED)))
-    for k in range(steps):
-        out[:, k] = flown.step(first + k)[:, : len(COMPARED)]
+    out = np.ascontiguousarray(flown.fly(steps, first).transpose(1, 0, 2)[:, :, : len(COMPARED)])
     if gusts is not None:
         rng = np.random.default_rng(gusts[1])
         out += rng.standard_normal(out.shape) * flight.noise[: len(COMPARED)]

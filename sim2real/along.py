@@ -1,0 +1,213 @@
+"""The compiled loop of the predictor: many variants of the plant along one record, corrected after every step or not.
+
+A step from Python costs more than the flight of forty variants; this is the one place where a record is flown.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from icing_env.blocks import (
+    AIR,
+    AT_AIR,
+    AT_COMMAND,
+    AT_CURRENT,
+    AT_GUSTS,
+    AT_PARAMETERS,
+    GUSTS_AFTER,
+    GUSTS_BEFORE,
+    NOW,
+    ROWS,
+    feel_block,
+    fill,
+    recall_loads,
+    rk4_block,
+)
+from icing_env.dynamics import present_aircraft
+from icing_env.frames import euler_angles
+from icing_env.integrate import GUSTS, copy, copy_gusts
+from icing_env.jit import entry, kernel
+from icing_env.lanes import LANES, lane
+from icing_env.memory import matrix, rows
+from icing_env.parameters import PARAMETERS
+from icing_env.sensors import filter_flow_and_inertial, read_quietly
+from icing_env.simulate import CLOCK, NUMBER
+from icing_env.turbulence import advance_turbulence, drift_turbulence
+from icing_env.types import COMMAND, CONTINUOUS, CURRENT, MEASUREMENT, OUTCOME, STATE
+from sim2real.channels import FED_BACK, MEASURED, SURFACES
+
+STILL = 1e-9  # m/s: gusts below it keep their states but draw nothing
+PRESENTED = 50  # steps between two looks at what mass, ice and height make of the coefficients (held over a record)
+STATES = ("u", "v", "w", "p", "q", "r", "altitude", "alpha_downwash", "dryden_u", "dryden_v1", "dryden_v2",
+          "dryden_w1", "dryden_w2", "gust_u", "gust_v", "gust_w", "gust_w_tail", "pitot", "vane_alpha", "vane_beta",
+          *(f"filtered_{c}" for c in ("alpha", "beta", "p", "q", "r", "ax", "ay", "az")))  # fmt: skip
+SLOW_SURFACE = 4.0  # a surface's lag in steps: it moves nearly in a straight line from sample to sample
+CONTROLS = (*SURFACES, "flap", "power_left", "power_right")
+
+
+def rk4_exponential(x: float) -> float:
+    """What the Runge-Kutta step makes of exp(-x)."""
+    return 1.0 - x + x**2 / 2.0 - x**3 / 6.0 + x**4 / 24.0
+
+
+REST = 1.0 - rk4_exponential(1.0 / SLOW_SURFACE)
+
+
+def columns(kind: np.dtype, names: tuple[str, ...]) -> np.ndarray:
+    """Where fields of eight bytes lie in a record seen as numbers."""
+    return np.array([(kind.names or ()).index(name) for name in names])
+
+
+X = columns(STATE, STATES)
+MOVED = len(STATES)  # then roll and pitch, corrected through the quaternion
+_E0, _E1, _E2, _E3 = (int(c) for c in columns(STATE, ("e0", "e1", "e2", "e3")))
+_Y = columns(MEASUREMENT, MEASURED[:11])
+_PHI = int(columns(MEASUREMENT, ("phi",))[0])
+_SURFACE, _ASKED = columns(STATE, SURFACES), columns(COMMAND, SURFACES)
+_FLAP, _POWER_L, _POWER_R, _U, _GUST_U, _ALTITUDE = (int(c) for c in columns(
+    STATE, ("flap", "power_left", "power_right", "u", "gust_u", "altitude")))  # fmt: skip
+_FLAP_ASKED = int(columns(COMMAND, ("flap",))[0])
+_EFFICIENCY, _STATIC, _FACTOR_L, _FACTOR_R = (int(c) for c in columns(
+    PARAMETERS, ("propeller_efficiency", "propeller_static_speed", "thrust_factor_left",
+                 "thrust_factor_right")))  # fmt: skip
+_N_STATE, _N_MEASUREMENT = len(STATE.names or ()), len(MEASUREMENT.names or ())
+_N_PARAMETERS, _N_COMMAND, _N_CURRENT = (len(kind.names or ()) for kind in (PARAMETERS, COMMAND, CURRENT))
+
+
+@kernel
+def steer(x: Any, u: Any, now: Any, then: Any) -> None:
+    """Let one row's surfaces go from the controls of a sample to those of the next; flap and power jump."""
+    for s in range(3):
+        x[_SURFACE[s]] = now[s]
+        u[_ASKED[s]] = now[s] + (then[s] - now[s]) / REST
+    x[_FLAP] = then[3]
+    u[_FLAP_ASKED] = then[3]
+    x[_POWER_L] = then[4]
+    x[_POWER_R] = then[5]
+
+
+@kernel
+def read(out: Any, x: Any, y: Any, p: Any) -> None:
+    """What one row's instruments should read, in the order of MEASURED."""
+    for c in range(11):
+        out[c] = y[_Y[c]]
+    out[11] = x[_ALTITUDE]
+    per_power = p[_EFFICIENCY] / np.sqrt((x[_U] - x[_GUST_U])**2 + p[_STATIC]**2)
+    out[12] = p[_FACTOR_L] * x[_POWER_L] * per_power
+    out[13] = p[_FACTOR_R] * x[_POWER_R] * per_power
+
+
+@kernel
+def turn(x: Any, phi: float, roll: float, pitch: float) -> None:
+    """Turn one row's attitude by small angles (rad): `roll` about body x, `pitch` about the horizontal y."""
+    wy, wz = pitch * np.cos(phi), -pitch * np.sin(phi)
+    e0, e1, e2, e3 = x[_E0], x[_E1], x[_E2], x[_E3]
+    x[_E0] = e0 + 0.5 * (-e1 * roll - e2 * wy - e3 * wz)
+    x[_E1] = e1 + 0.5 * (e0 * roll + e2 * wz - e3 * wy)
+    x[_E2] = e2 + 0.5 * (e0 * wy + e3 * roll - e1 * wz)
+    x[_E3] = e3 + 0.5 * (e0 * wz + e1 * wy - e2 * roll)
+
+
+@kernel
+def sense(s: Any, m: Any, c: Any, p: Any, felt: tuple) -> None:
+    """Instruments of one row at the end of a step, without noise: the fast channels and the attitude."""
+    fx, fy, fz, airspeed, alpha, beta = felt[0], felt[1], felt[2], felt[6], felt[7], felt[8]
+    filter_flow_and_inertial(s, s, c, p, airspeed, alpha, beta, fx, fy, fz)
+    read_quietly(s, m, p)
+    phi, theta, _psi = euler_angles(s.e0, s.e1, s.e2, s.e3)
+    m.phi = phi + p.bias_phi
+    m.theta = theta + p.bias_theta
+
+
+@kernel
+def correct(x: Any, phi: float, left: Any, measured: Any, stretch: Any, gain: Any, change: Any) -> None:
+    """Turn one row's prediction `left` into measured less predicted, and move its states by the gain times that."""
+    change[:] = 0.0
+    for c in range(len(left)):
+        left[c] = measured[c] - left[c]
+        if c < FED_BACK and np.isfinite(measured[c]):
+            fed = left[c]*stretch[c]
+            for s in range(MOVED + 2):
+                change[s] += gain[c, s]*fed
+    for s in range(MOVED):
+        x[X[s]] += change[s]
+    turn(x, phi, change[MOVED], change[MOVED + 1])
+
+
+@kernel
+def advance(block: Any, states: Any, parameters: Any, speeds: Any, count: int, dt: float, substeps: int) -> None:
+    """One step of up to LANES rows by Runge and Kutta, gusts in straight lines."""
+    for j in range(count):
+        s, p = states[j], parameters[j]
+        copy_gusts(lane(block, GUSTS_BEFORE, j, GUSTS), s)
+        if p.turbulence_sigma_w > STILL:
+            advance_turbulence(s, p, speeds[j], dt)
+        else:
+            drift_turbulence(s, p, speeds[j], dt)
+        s.step += 1
+        copy(lane(block, NOW, j, CONTINUOUS), s)
+        copy_gusts(lane(block, GUSTS_AFTER, j, GUSTS), s)
+    for k in range(substeps):
+        rk4_block(block, count, dt/substeps, k, substeps)
+    for j in range(count):
+        copy_gusts(lane(block, AT_GUSTS, j, GUSTS), states[j])
+    feel_block(block, count)
+    for j in range(count):
+        copy(states[j], lane(block, NOW, j, CONTINUOUS))
+        speeds[j] = lane(block, AT_AIR, j, AIR).airspeed
+
+
+@entry
+def along(table: Any, controls: Any, first: Any, measured: Any, stretch: Any, gain: Any, force_at: Any,
+          force: Any, error_at: Any, error: Any, out: Any) -> None:
+    """Fly the rows of a fleet (`table`: of `Fleet.table`) along a record, LANES at a time to its end.
+
+    Nothing draws noise but gusts with an intensity above STILL; ice stays as it is.
+
+    Args:
+        controls: [N, CONTROLS].
+        first: sample at which each row starts [n].
+        measured: [N, channels of MEASURED], nan where nothing was measured.
+        stretch: by which a fed-back channel's error is multiplied [FED_BACK].
+        gain: [1 or n, steps, FED_BACK, states then roll and pitch], the last step's goes on; empty for free flight.
+        force_at, force: (row, state) of what is added to states [F, 2], and how much at each sample [F, N].
+        error_at, error: (row, channel) of what is added to readings [E, 2], and how much at each sample [E, N].
+        out: [steps, n, channels]; measured less predicted, or in free flight predicted.
+    """
+    states, readings, currents = rows(table, 0, STATE), rows(table, 1, MEASUREMENT), rows(table, 2, CURRENT)
+    parameters, outcomes = rows(table, 3, PARAMETERS), rows(table, 5, OUTCOME)
+    x, y = matrix(table, 0, _N_STATE, NUMBER), matrix(table, 1, _N_MEASUREMENT, NUMBER)
+    p, u = matrix(table, 3, _N_PARAMETERS, NUMBER), matrix(table, 4, _N_COMMAND, NUMBER)
+    held = matrix(table, 2, _N_CURRENT, NUMBER)
+    clock = rows(table, 6, CLOCK)[0]
+    block, change, speeds = np.zeros(ROWS*LANES), np.zeros(MOVED + 2), np.zeros(len(x))
+    for i in range(len(x)):
+        speeds[i] = outcomes[i].airspeed
+    for at in range(0, len(x), LANES):
+        count = min(LANES, len(x) - at)
+        for j in range(count):
+            fill(block, AT_PARAMETERS, j, p[at + j])
+        for k in range(len(out)):
+            for j in range(count):
+                i = at + j
+                steer(x[i], u[i], controls[first[i] + k], controls[first[i] + k + 1])
+                fill(block, AT_COMMAND, j, u[i])
+                if k % PRESENTED == 0:
+                    present_aircraft(states[i], parameters[i], currents[i])
+                    fill(block, AT_CURRENT, j, held[i])
+            advance(block, states[at:], parameters[at:], speeds[at:], count, clock.dt, clock.substeps)
+            for j in range(count):
+                i = at + j
+                sense(states[i], readings[i], currents[i], parameters[i], recall_loads(block, j))
+                read(out[k, i], x[i], y[i], p[i])
+            for j in range(len(error)):
+                if at <= error_at[j, 0] < at + count:
+                    out[k, error_at[j, 0], error_at[j, 1]] += error[j, k + 1]
+            for i in range(at, at + count if len(gain) > 0 else at):
+                own = gain[i if len(gain) > 1 else 0, min(k, gain.shape[1] - 1)]
+                correct(x[i], y[i, _PHI], out[k, i], measured[k + 1], stretch, own, change)
+            for j in range(len(force)):
+                if at <= force_at[j, 0] < at + count:
+                    x[force_at[j, 0], force_at[j, 1]] += force[j, k + 1]

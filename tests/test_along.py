@@ -1,0 +1,62 @@
+"""The compiled loop of the predictor flies what the simulator's own step flies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from icing_env import scenario
+from sim2real.along import REST
+from sim2real.channels import MEASURED, SURFACES
+from sim2real.predictor import Predictor
+from sim2real.reconstruct import Reconstruction, reconstruct
+from testbed.flight import fly
+
+SIDES = ("left", "right")
+
+
+@pytest.fixture(scope="module")
+def flight() -> Reconstruction:
+    chosen = scenario.load("clear_air", duration=20.0, parameters={"turbulence_sigma_w": 0.5})
+    return reconstruct(fly(chosen, seed=3, observer=False, protection=False).record)
+
+
+@pytest.mark.parametrize("rows", [1, 8, 11])
+def test_free_flight_is_the_simulators(flight: Reconstruction, rows: int) -> None:
+    """Ten seconds, every row another aircraft: the simulator's own step, fed the same controls, goes the same way."""
+    parameters = np.repeat(flight.parameters, rows)
+    parameters["Cm_alpha"] *= np.linspace(0.7, 1.3, rows)
+    parameters["scale_alpha"] = np.linspace(-0.1, 0.1, rows)
+    steps = round(10.0 / flight.dt)
+    ours, theirs = Predictor(flight, parameters), Predictor(flight, parameters)
+    for one in (ours, theirs):
+        one.place(0)
+    found = ours.fly(steps)
+    fleet, expected = theirs.fleet, np.empty_like(found)
+    for k in range(steps):
+        for name in SURFACES:
+            now, then = flight.controls[name][k], flight.controls[name][k + 1]
+            fleet.state[name], fleet.command[name] = now, now + (then - now) / REST
+        fleet.state["flap"] = fleet.command["flap"] = flight.controls["flap"][k + 1]
+        for side in SIDES:
+            fleet.state[f"power_{side}"] = flight.controls[f"power_{side}"][k + 1]
+        fleet.step()
+        expected[k] = theirs.read()
+    size = np.abs(expected).max(axis=(0, 1)) + 1e-3
+    assert np.abs((found - expected) / size).max() < 1e-9
+
+
+def test_a_row_flies_alone_as_in_a_batch(flight: Reconstruction) -> None:
+    """To the bit, with feedback and with pushes."""
+    from sim2real.candidates import bank, parameter_rows, pushes
+    from sim2real.kalman import gains
+    from sim2real.predictor import innovations
+
+    gain, candidates = gains(flight, (0.5,))[0].with_start(), bank()
+    rows, pushed = parameter_rows(flight, candidates), pushes(flight, candidates)
+    together = innovations(flight, rows, gain.K, pushed)
+    for row in (0, 7, 100, candidates.terms[20].row):
+        own = tuple(type(q)(0, q.target, q.series, q.sensor) for q in pushed if q.row == row)
+        alone = innovations(flight, rows[row : row + 1], gain.K, own)
+        np.testing.assert_array_equal(alone[:, 0], together[:, row])
+    assert together.shape[2] == len(MEASURED)
