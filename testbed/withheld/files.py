@@ -28,10 +28,11 @@ def write_text(path: Path, text: str) -> None:
 
 
 def record_text(channels: Mapping[str, NDArray], commands: NDArray) -> str:
-    """A record as CSV; slow channels are blank between their samples."""
+    """A record as CSV; blank between the samples of slow channels and where nan; absent ones are left out."""
     still = np.zeros(len(commands))  # the flap
-    fast = [np.arange(len(commands)) * DT, *(channels[n] for n in instruments.FAST), still, *commands.T]
-    header = ["time", *instruments.FAST, "flap", *COMMANDS, *instruments.SLOW]
+    known = [n for n in instruments.FAST if n in channels]
+    fast = [np.arange(len(commands)) * DT, *(channels[n] for n in known), still, *commands.T]
+    header = ["time", *known, "flap", *COMMANDS, *instruments.SLOW]
     slow = [channels[n] for n in instruments.SLOW]
     table, sparse = np.column_stack(fast).tolist(), np.column_stack(slow).tolist()
     short = ",".join(["%.7g"] * len(fast))
@@ -43,7 +44,7 @@ def record_text(channels: Mapping[str, NDArray], commands: NDArray) -> str:
             lines.append(line + "," + ",".join(f"{v:.8g}" for v in sparse[k]))
         else:
             lines.append(line + blank)
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines).replace("nan", "") + "\n"
 
 
 def side_text(flight: str, role: str) -> str:

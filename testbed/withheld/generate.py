@@ -21,8 +21,10 @@ import numpy as np
 
 from testbed.withheld import files, numbers
 from testbed.withheld.draw import Design, designs
+from testbed.withheld.faults import excused, fault_count, fault_designs, spoiled
 from testbed.withheld.flights import CATALOGUE, Aircraft, recorded
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
+from testbed.withheld.plant import DT
 from testbed.withheld.separation import Distances, Geometry, distances, geometry
 from testbed.withheld.windows import Held, closures, held
 
@@ -38,7 +40,7 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
 
     Args:
         out: a folder, made if absent.
-        cases: how many.
+        cases: how many, beside which some records with faults are drawn.
         seed: for development; from the operating system if omitted.
         workers: processes.
         progress: told after every group of cases.
@@ -53,20 +55,21 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
     for folder in (records, keys):
         folder.mkdir(parents=True, exist_ok=True)
     names, seed, known = _roll(keys / "seed.json", cases, seed)
-    jobs = [(name, design) for name, design in zip(names, designs(cases, seed), strict=True)
+    drawn = [*designs(cases, seed), *fault_designs(cases, seed)]
+    jobs = [(name, design) for name, design in zip(names, drawn, strict=True)
             if not ((records / name).is_dir() and (keys / f"{name}.json").is_file())]
     groups = [list(group) for _, group in groupby(sorted(jobs, key=lambda job: bank_of(job[1])),
                                                   key=lambda job: bank_of(job[1]))]
-    done = cases - len(jobs)
+    done = len(drawn) - len(jobs)
     if workers == 1:
         for group in groups:
             done += _make(group, records, keys)
-            progress(f"flown {done} of {cases}")
+            progress(f"flown {done} of {len(drawn)}")
     elif groups:
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
             for made in pool.map(_make, groups, [records] * len(groups), [keys] * len(groups)):
                 done += made
-                progress(f"flown {done} of {cases}")
+                progress(f"flown {done} of {len(drawn)}")
     sealed = files.manifest(records, keys, names) | {
         "numbers": numbers.digest(), "count": cases, "development_seed": seed if known else None}
     files.write_text(out / "manifest.json", json.dumps(sealed, indent=1))
@@ -84,7 +87,7 @@ def _roll(path: Path, cases: int, seed: int | None) -> tuple[list[str], int, boo
     seed = seed if seed is not None else secrets.randbits(120)
     rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
     names: list[str] = []
-    while len(names) < cases:
+    while len(names) < cases + fault_count(cases):
         name = rng.bytes(5).hex() if given else secrets.token_hex(5)
         if name not in names:
             names.append(name)
@@ -149,7 +152,8 @@ def _flown(name: str, design: Design, parts: Parts,
     for i, manoeuvre in enumerate(PLANS[design.plan]):
         flown, read = recorded(aircraft, manoeuvre, design.gain, design.air, design.random(i))
         flights.append(held(flown, read))
-        texts[f"{i + 1}.csv"] = files.record_text(read, flown.commands)
+        seen = read if design.fault is None else spoiled(read, design.fault, DT)
+        texts[f"{i + 1}.csv"] = files.record_text(seen, flown.commands)
         texts[f"{i + 1}.toml"] = files.side_text(name, "diagnose" if i < DIAGNOSED else "held_out")
     closed = closures(design.baseline, parts, PLANS[design.plan][DIAGNOSED:], flights[DIAGNOSED:], design.gain,
                       design.air)
@@ -168,12 +172,14 @@ def _scaled(design: Design, shape: Geometry, parts: Parts, found: Distances) -> 
 
 def _key(name: str, design: Design, parts: Parts, found: Distances) -> dict[str, Any]:
     where = sorted({place for effect, _, _ in parts for place in CATALOGUE[effect].where})
+    fault = None if design.fault is None else {**asdict(design.fault), "excused": excused(design.fault.channel)}
     return {
         "case": name, "salt": secrets.token_hex(16), "tier": design.tier, "sigma_w": design.sigma,
         "effects": [effect for effect, _, _ in parts], "forms": [form for _, form, _ in parts],
         "parameters": {effect: {CATALOGUE[effect].parameter: size} for effect, _, size in parts},
         "where": where, "D_none": found.none, "D": found.rivals, "D_pair": found.pair,
-        "design": {k: v for k, v in asdict(design).items() if k not in ("tier", "parts")},
+        "fault": fault,
+        "design": {k: v for k, v in asdict(design).items() if k not in ("tier", "parts", "fault")},
     }  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -19,6 +20,7 @@ import numpy as np
 
 DETECTABLE, APART, SAME = 6.0, 5.0, 3.5  # D to none; D beyond which a rival is another; D within which it is not
 BINS, LOWEST, HIGHEST = 15, 0.02, 0.98
+HARMLESS = ("slow",)  # a channel at another rate is allowed
 Case = dict[str, Any]
 
 
@@ -68,8 +70,26 @@ def flat(answer: dict[str, Any], key: dict[str, Any], flown: dict[str, Any] | No
         "inclusion": [(p, name in key["effects"]) for name, p in sorted(inclusion.items())],
         "covered": truth in told, "size": len(told), "closure_told": held.get("closure"), **_closures(key, flown),
         "seen": frozenset(c for c, p in places.items() if p >= 0.5), "where": frozenset(key["where"]),
-        "interval": _interval(answer, key), "seconds": answer.get("seconds"),
+        "interval": _interval(answer, key), "seconds": answer.get("seconds"), **_faulty(answer, key),
     }  # fmt: skip
+
+
+def _faulty(answer: dict[str, Any], key: dict[str, Any]) -> dict[str, Any]:
+    """Whether the faulty channel is named (refused by name counts, "could not be checked" does not) and what is blamed.
+
+    Blamed falsely is an unknown effect, or one that neither is there nor enters at the faulty channel alone.
+    """
+    fault = key.get("fault")
+    if fault is None:
+        return {"fault": None, "named": False, "blamed": False}
+    channel = fault["channel"]
+    if "error" in answer:
+        return {"fault": fault["kind"], "named": bool(re.search(rf"\b{channel}\b", answer["error"])), "blamed": False}
+    told = any(p["channel"] == channel and "could not be checked" not in p["kind"] for p in answer["data_problems"])
+    first = max(answer["hypotheses"], key=lambda h: h["probability"])
+    allowed = {*key["effects"], *fault["excused"]}
+    explained = answer["verdict"] == "explained" and not set(first["effects"]) <= allowed
+    return {"fault": fault["kind"], "named": told, "blamed": explained or answer["verdict"] == "unknown"}
 
 
 def _closures(key: dict[str, Any], flown: dict[str, Any] | None) -> dict[str, tuple[float, float] | None]:
@@ -246,6 +266,20 @@ def by_tier(cases: Sequence[Case]) -> dict[str, Any]:
     return tiers
 
 
+def faults(cases: Sequence[Case]) -> dict[str, Any] | None:
+    """Records with a fault: right where it is named and nothing is blamed falsely; a HARMLESS one need not be named."""
+    if not cases:
+        return None
+
+    def right(rows: Sequence[Case]) -> float | None:
+        return share([(not c["failed"] if c["fault"] in HARMLESS else c["named"]) and not c["blamed"] for c in rows])
+
+    kinds = sorted({c["fault"] for c in cases})
+    return {"cases": len(cases), "right": right(cases), "named": share([c["named"] for c in cases]),
+            "refused": share([c["failed"] for c in cases]), "blamed": share([c["blamed"] for c in cases]),
+            "right_by_kind": {k: right([c for c in cases if c["fault"] == k]) for k in kinds}}
+
+
 def withheld(answers: Path, keys: Path) -> dict[str, Any] | None:
     """Answers to single effects that the library lacked: right where unknown or a rival truly within D of SAME."""
     found = []
@@ -269,7 +303,8 @@ def withheld(answers: Path, keys: Path) -> dict[str, Any] | None:
 
 def baselines(answers: Path, keys: Path, cases: Sequence[Case]) -> dict[str, Any]:
     """What knowing nothing scores: the answers dealt to other cases, and "no gap" always."""
-    found = sorted(answers.glob("*.json"))
+    found = [path for path in sorted(answers.glob("*.json"))
+             if json.loads((keys / path.name).read_text())["tier"] != "faults"]
     dealt = np.random.default_rng(0).permutation(len(found))
     permuted = [flat(json.loads(found[i].read_text()), json.loads((keys / path.name).read_text()))
                 for i, path in zip(dealt, found, strict=True)]
@@ -281,10 +316,13 @@ def baselines(answers: Path, keys: Path, cases: Sequence[Case]) -> dict[str, Any
 
 def score(answers: Path, keys: Path, refly: Path | None = None, without: Path | None = None) -> dict[str, Any]:
     """Every figure of the interface, intervals, tiers, mismatched forms (nulls and unknown included) and baselines."""
-    cases = load(answers, keys, refly)
+    everything = load(answers, keys, refly)
+    cases = [c for c in everything if c["tier"] != "faults"]
+    spoiled = faults([c for c in everything if c["tier"] == "faults"])
     mismatched = [c for c in cases if c["tier"] in ("null", "unknown") or c["other"]]
     left_out = None if without is None else withheld(without, keys)
-    tiers = by_tier(cases) | ({} if left_out is None else {"without": left_out})
+    beside = {"faults": spoiled, "without": left_out}
+    tiers = by_tier(cases) | {name: entry for name, entry in beside.items() if entry is not None}
     return {**figures(cases), "intervals95": intervals(cases), "by_tier": tiers,
             "mismatched_form": {**figures(mismatched), "intervals95": intervals(mismatched)},
             "baselines": baselines(answers, keys, cases)}  # fmt: skip

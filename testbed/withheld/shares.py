@@ -1,7 +1,7 @@
 """How many single effects of a set an ideal observer could name: designs and their distances alone, nothing flown.
 
-`python -m testbed.withheld.shares --cases 2400 [--seed N] [--out FILE]` prints a table by effect; what the sizes drawn
-in `effects.py` and `draw.py` rest on.
+`python -m testbed.withheld.shares --cases 2400 [--seed N] [--only A,B] [--out FILE]` prints a table by effect,
+on which the sizes drawn in `effects.py` and `draw.py` rest.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -21,15 +21,18 @@ from testbed.withheld.score import DETECTABLE, identifiable
 from testbed.withheld.separation import Geometry, distances, geometry
 
 
-def singles(cases: int, seed: int, progress: Callable[[str], None] = lambda text: None) -> Iterator[dict[str, Any]]:
+def singles(cases: int, seed: int, progress: Callable[[str], None] = lambda text: None,
+            only: Sequence[str] = ()) -> Iterator[dict[str, Any]]:
     """Key-like rows of the single effects of a set, without a flight of them.
 
     Args:
         cases: of the whole set.
         seed: of the set.
         progress: told after every gust and noise level.
+        only: effects; all if empty.
     """
-    drawn = sorted((d for d in designs(cases, seed) if d.tier == "single"), key=lambda d: (bank_of(d), d.air))
+    drawn = [d for d in designs(cases, seed) if d.tier == "single" and (not only or d.parts[0][0] in only)]
+    drawn.sort(key=lambda d: (bank_of(d), d.air))
     done = 0
     for _, same in groupby(drawn, key=lambda d: (bank_of(d), d.air)):
         group = list(same)
@@ -71,8 +74,10 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=2400)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, help="rows as JSON")
+    parser.add_argument("--only", default="", help="effects, with commas between; all if omitted")
     given = parser.parse_args()
-    rows = list(singles(given.cases, DEVELOPMENT_SEED + given.seed, lambda text: print(text, flush=True)))
+    only = tuple(name for name in given.only.split(",") if name)
+    rows = list(singles(given.cases, DEVELOPMENT_SEED + given.seed, lambda text: print(text, flush=True), only))
     if given.out is not None:
         given.out.write_text(json.dumps(rows), encoding="utf-8")
     print("\n".join(table(rows)))

@@ -1,0 +1,89 @@
+"""Records with faults: drawn fairly, spoiled as said, and right only where named and nothing else is blamed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from testbed.withheld import draw, faults, generate, score
+
+N, DT = 2001, 0.02
+X = {name: np.sin(0.01 * np.arange(N)) + 2.0 for name in (*faults.EVERY, "altitude")}
+
+
+def test_every_kind_is_drawn_beside_the_set_and_the_set_stays_as_it_was():
+    drawn = faults.fault_designs(2400, 1)
+    assert len(drawn) == 60 and len(faults.fault_designs(150, 1)) == 24 and not faults.fault_designs(3, 1)
+    assert {d.fault.kind for d in drawn} == set(faults.KINDS)
+    assert {len(d.parts) for d in drawn} == {0, 1} and {d.tier for d in drawn} == {"faults"}
+    assert len({d.fault.channel for d in drawn}) > 10
+    assert faults.fault_designs(150, 1) == faults.fault_designs(150, 1) != faults.fault_designs(150, 2)
+    assert len(draw.designs(150, 1)) == 150 and all(d.fault is None for d in draw.designs(150, 1))
+
+
+@pytest.mark.parametrize("kind", sorted(faults.KINDS))
+def test_only_the_faulty_channel_is_touched_and_as_the_fault_says(kind):
+    fault = draw.Fault(kind, "alpha", 5)
+    found = faults.spoiled(X, fault, DT)
+    assert all(np.array_equal(found[n], X[n]) for n in X if n != "alpha")
+    if kind == "dropped":
+        assert "alpha" not in found
+        return
+    x, true = found["alpha"], X["alpha"]
+    assert not np.array_equal(x, true)
+    known = np.isfinite(x)
+    if kind in ("sign", "unit"):
+        assert np.allclose(x / true, {"sign": -1.0, "unit": 180.0 / np.pi}[kind])
+    elif kind == "stuck":
+        still = np.flatnonzero(np.diff(x) == 0.0)
+        assert faults.STUCK[0] < len(still) * DT < faults.STUCK[1] and np.ptp(still) == len(still) - 1
+    elif kind == "skew":
+        late = int(np.argmin([np.max(np.abs(x[100:] - np.roll(true, k)[100:])) for k in range(40)]))
+        assert faults.SKEW[0] <= late * DT <= faults.SKEW[1]
+    else:
+        assert np.array_equal(x[known], true[known])
+        share = {"blank": (0.0, 0.0), "slow": (0.15, 0.25), "dropouts": (0.5, 0.99)}[kind]
+        assert share[0] <= known.mean() <= share[1]
+        if kind == "slow":
+            assert len(set(np.diff(np.flatnonzero(known)))) > 1  # at no constant rate
+
+
+def test_files_of_a_faulty_case_hold_the_fault_and_the_key_tells_it():
+    design = draw.Design("faults", (), 0, 1.0, 0.5, 1.3, 1.0, {}, 7, fault=draw.Fault("dropped", "beta", 3))
+    texts, key = generate.make_case("a", design, None)
+    assert "beta" not in texts["1.csv"].splitlines()[0].split(",")
+    assert key["fault"]["channel"] == "beta" and "beta_bias" in key["fault"]["excused"]
+    blank, _ = generate.make_case("a", replace(design, fault=draw.Fault("blank", "beta", 3)), None)
+    header, first = blank["4.csv"].splitlines()[:2]
+    assert first.split(",")[header.split(",").index("beta")] == "" and "nan" not in blank["4.csv"]
+
+
+def key(kind: str, effects: list[str]) -> dict:
+    return {"tier": "faults", "sigma_w": 0.0, "effects": effects, "forms": [], "D_none": 0.0, "D_pair": 0.0, "D": {},
+            "where": [], "parameters": {},
+            "fault": {"kind": kind, "channel": "q", "excused": ["pitch_gyro_bias"]}}  # fmt: skip
+
+
+def answer(verdict: str, effects: list[str], *problems: tuple[str, str]) -> dict:
+    return {"verdict": verdict, "hypotheses": [{"effects": effects, "unknown": verdict == "unknown", "probability": 1}],
+            "credible_set_95": [0], "effects": [], "where": {}, "gap": {},
+            "data_problems": [{"channel": c, "kind": k, "from": 0, "to": 1, "repaired": False} for c, k in problems]}
+
+
+@pytest.mark.parametrize(("kind", "told", "right"), [
+    ("sign", answer("no_gap", [], ("q", "sign reversed")), True),
+    ("sign", answer("no_gap", [], ("p", "sign reversed")), False),
+    ("sign", answer("no_gap", [], ("q", "sign and unit could not be checked from this record")), False),
+    ("sign", answer("explained", ["cg_shift"], ("q", "sign reversed")), True),
+    ("sign", answer("explained", ["pitch_gyro_bias"], ("q", "sign reversed")), True),
+    ("sign", answer("explained", ["pitch_damping"], ("q", "sign reversed")), False),
+    ("sign", answer("unknown", [], ("q", "sign reversed")), False),
+    ("sign", {"error": "record 'a': q looks like deg/s"}, True),
+    ("sign", {"error": "record 'a': quite unusable"}, False),
+    ("slow", answer("no_gap", []), True),
+    ("slow", {"error": "record 'a': q has too few samples"}, False),
+])  # fmt: skip
+def test_right_is_named_and_nothing_blamed(kind, told, right):
+    assert score.faults([score.flat(told, key(kind, ["cg_shift"]))])["right"] == float(right)
