@@ -86,4 +86,5 @@ def answer(verdict: str, effects: list[str], *problems: tuple[str, str]) -> dict
     ("slow", {"error": "record 'a': q has too few samples"}, False),
 ])  # fmt: skip
 def test_right_is_named_and_nothing_blamed(kind, told, right):
-    assert score.faults([score.flat(told, key(kind, ["cg_shift"]))])["right"] == float(right)
+    found = score.by_tier([score.flat(told, key(kind, ["cg_shift"]))], [])["faults"]
+    assert found["right"] == found["right_by_kind"][kind] == float(right)

@@ -12,7 +12,7 @@ import json
 import math
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,27 +49,29 @@ def flat(answer: dict[str, Any], key: dict[str, Any], flown: dict[str, Any] | No
     `flown`: gaps on held-out records of the answer's model, by the generator's plant.
     """
     hypotheses = sorted(answer.get("hypotheses", []), key=lambda h: -h["probability"])
-    truth = _truth(key)
-    listed = [(frozenset(h["effects"]), bool(h["unknown"])) for h in hypotheses]
-    inclusion: dict[str, float] = {}
-    for h in hypotheses:
-        for name in h["effects"]:
-            inclusion[name] = inclusion.get(name, 0.0) + h["probability"]
+    truth = (frozenset(() if key["tier"] == "unknown" else key["effects"]), key["tier"] == "unknown")
+    listed = [_label(h) for h in hypotheses]
+    near = (answer.get("verdict") == "explained" and not listed[0][1] and len(listed[0][0]) == 1
+            and key["D"].get(*listed[0][0], math.inf) < SAME)
+    inclusion = {name: sum(h["probability"] for h in hypotheses if name in h["effects"])
+                 for name in {n for h in hypotheses for n in h["effects"]}}  # fmt: skip
     told = [_label(answer["hypotheses"][i]) for i in answer.get("credible_set_95", [])]
-    places = answer.get("where", {}).get("components", {})
-    held = answer.get("gap", {}).get("held_out", {})
+    closure = answer.get("gap", {}).get("held_out", {}).get("closure")
     return {
         "tier": key["tier"], "sigma": key["sigma_w"], "other": "other" in key["forms"], "truth": truth,
         "effects": tuple(key["effects"]), "failed": "error" in answer, "none": key["D_none"], "pair": key["D_pair"],
         "identifiable": identifiable(key),
         "top1": bool(listed) and (listed[0] == truth or _in_class(answer, listed[0], key)),
         "exact": bool(listed) and listed[0] == truth, "top3": truth in listed[:3],
-        "alarm": answer.get("verdict") != "no_gap",
+        "alarm": answer.get("verdict") != "no_gap", "silent": answer.get("verdict") == "no_gap",
+        "told_unknown": answer.get("verdict") == "unknown", "near": near,
+        "open": near or answer.get("verdict") == "unknown",
         "p_unknown": sum(h["probability"] for h in hypotheses if h["unknown"]),
         "p_truth": sum(h["probability"] for h in hypotheses if _label(h) == truth),
         "inclusion": [(p, name in key["effects"]) for name, p in sorted(inclusion.items())],
-        "covered": truth in told, "size": len(told), "closure_told": held.get("closure"), **_closures(key, flown),
-        "seen": frozenset(c for c, p in places.items() if p >= 0.5), "where": frozenset(key["where"]),
+        "covered": truth in told, "size": len(told), "closure_told": closure, **_closures(key, flown),
+        "seen": frozenset(c for c, p in answer.get("where", {}).get("components", {}).items() if p >= 0.5),
+        "where": frozenset(key["where"]),
         "interval": _interval(answer, key), "seconds": answer.get("seconds"), **_faulty(answer, key),
     }  # fmt: skip
 
@@ -77,19 +79,19 @@ def flat(answer: dict[str, Any], key: dict[str, Any], flown: dict[str, Any] | No
 def _faulty(answer: dict[str, Any], key: dict[str, Any]) -> dict[str, Any]:
     """Whether the faulty channel is named (refused by name counts, "could not be checked" does not) and what is blamed.
 
-    Blamed falsely is an unknown effect, or one that neither is there nor enters at the faulty channel alone.
+    Blamed falsely is an unknown effect, or one that neither is there nor enters at the faulty channel alone. Caught is
+    a fault named, nothing being blamed; a HARMLESS one need not be named, but is not refused either.
     """
-    fault = key.get("fault")
-    if fault is None:
-        return {"fault": None, "named": False, "blamed": False}
-    channel = fault["channel"]
-    if "error" in answer:
-        return {"fault": fault["kind"], "named": bool(re.search(rf"\b{channel}\b", answer["error"])), "blamed": False}
-    told = any(p["channel"] == channel and "could not be checked" not in p["kind"] for p in answer["data_problems"])
-    first = max(answer["hypotheses"], key=lambda h: h["probability"])
-    allowed = {*key["effects"], *fault["excused"]}
-    explained = answer["verdict"] == "explained" and not set(first["effects"]) <= allowed
-    return {"fault": fault["kind"], "named": told, "blamed": explained or answer["verdict"] == "unknown"}
+    if key.get("fault") is None:
+        return {}
+    kind, channel, excused = (key["fault"][name] for name in ("kind", "channel", "excused"))
+    words = [p["channel"] for p in answer.get("data_problems", []) if "could not be checked" not in p["kind"]]
+    named = channel in [*words, *re.findall(r"\w+", answer.get("error", ""))]
+    first: Case = max(answer.get("hypotheses", []), key=lambda h: h["probability"], default={"effects": []})
+    foreign = not set(first["effects"]) <= {*key["effects"], *excused}
+    blamed = answer.get("verdict") == "unknown" or (answer.get("verdict") == "explained" and foreign)
+    caught = not blamed and ("error" not in answer if kind in HARMLESS else named)
+    return {"fault": kind, "named": named, "blamed": blamed, "caught": caught}
 
 
 def _closures(key: dict[str, Any], flown: dict[str, Any] | None) -> dict[str, tuple[float, float] | None]:
@@ -107,10 +109,6 @@ def _closures(key: dict[str, Any], flown: dict[str, Any] | None) -> dict[str, tu
         if before > held[least]:
             found[kind] = (1.0 - flown[f"{prefix}after"] / before, 1.0 - held[f"{prefix}oracle"] / before)
     return found
-
-
-def _truth(key: dict[str, Any]) -> tuple[frozenset[str], bool]:
-    return (frozenset(), True) if key["tier"] == "unknown" else (frozenset(key["effects"]), False)
 
 
 def _label(hypothesis: dict[str, Any]) -> tuple[frozenset[str], bool]:
@@ -133,9 +131,8 @@ def _in_class(answer: dict[str, Any], first: tuple[frozenset[str], bool], key: d
         return False
     (name,) = names
     entry = next((e for e in answer["effects"] if e["name"] == name), None)
-    members = {name, *(entry or {}).get("indistinguishable_from", [])}
-    return key["effects"][0] in members and all(
-        key["D"].get(m, math.inf) < SAME for m in members - {key["effects"][0]})
+    members, true = {name, *(entry or {}).get("indistinguishable_from", [])}, key["effects"][0]
+    return true in members and all(key["D"].get(m, math.inf) < SAME for m in members - {true})
 
 
 def _interval(answer: dict[str, Any], key: dict[str, Any]) -> bool | None:
@@ -248,84 +245,55 @@ def intervals(cases: Sequence[Case], repeats: int = 200) -> dict[str, list[float
     return found
 
 
-def by_tier(cases: Sequence[Case]) -> dict[str, Any]:
-    """What each tier shows by itself; every effect's recall under "single"."""
-    tiers: dict[str, Any] = {}
-    rules: dict[str, Callable[[Case], bool]] = {
-        "null": lambda c: not c["alarm"], "single": lambda c: c["top1"], "pair": lambda c: c["exact"],
-        "unknown": lambda c: c["exact"]}  # fmt: skip
-    for tier, rule in rules.items():
-        chosen = [c for c in cases if c["tier"] == tier]
-        tiers[tier] = {"cases": len(chosen), "right": share([rule(c) for c in chosen]),
-                       "detectable": sum(c["none"] >= DETECTABLE for c in chosen),
-                       "right_by_gust": {f"{s:g}": share([rule(c) for c in chosen if c["sigma"] == s])
-                                         for s in (0.0, 0.5, 1.5)}}  # fmt: skip
+def _shares(cases: Sequence[Case], right: str, *others: str) -> dict[str, Any]:
+    """How many cases of a tier are right, at each gust level too, and shares of whatever else is asked for."""
+    return {"cases": len(cases), "right": share([c[right] for c in cases]),
+            "right_by_gust": {f"{s:g}": share([c[right] for c in cases if c["sigma"] == s]) for s in (0.0, 0.5, 1.5)},
+            **{name: share([c[name] for c in cases]) for name in others}}  # fmt: skip
+
+
+def by_tier(cases: Sequence[Case], without: Sequence[Case]) -> dict[str, Any]:
+    """What each tier shows by itself; every effect's recall under "single"; "faults" and "without" where there are any.
+
+    `without`: answers to single effects that the library lacked, right where unknown or a rival within D of SAME.
+    """
+    of = {tier: [c for c in cases if c["tier"] == tier] for tier in ("null", "single", "pair", "unknown", "faults")}
+    rules = {"null": "silent", "single": "top1", "pair": "exact", "unknown": "exact"}
+    tiers = {tier: _shares(of[tier], rule) | {"detectable": sum(c["none"] >= DETECTABLE for c in of[tier])}
+             for tier, rule in rules.items()}  # fmt: skip
     clear = [c for c in cases if c["identifiable"]]
     names = sorted({c["effects"][0] for c in clear})
     tiers["single"]["recall"] = {n: share([c["top1"] for c in clear if c["effects"] == (n,)]) for n in names}
+    if of["faults"]:
+        kinds = {k: [c["caught"] for c in of["faults"] if c["fault"] == k] for k in {c["fault"] for c in of["faults"]}}
+        tiers["faults"] = _shares(of["faults"], "caught", "named", "failed", "blamed")
+        tiers["faults"]["right_by_kind"] = {kind: share(caught) for kind, caught in sorted(kinds.items())}
+    if without:
+        tiers["without"] = _shares(without, "open", "told_unknown", "near", "silent")
     return tiers
 
 
-def faults(cases: Sequence[Case]) -> dict[str, Any] | None:
-    """Records with a fault: right where it is named and nothing is blamed falsely; a HARMLESS one need not be named."""
-    if not cases:
-        return None
-
-    def right(rows: Sequence[Case]) -> float | None:
-        return share([(not c["failed"] if c["fault"] in HARMLESS else c["named"]) and not c["blamed"] for c in rows])
-
-    kinds = sorted({c["fault"] for c in cases})
-    return {"cases": len(cases), "right": right(cases), "named": share([c["named"] for c in cases]),
-            "refused": share([c["failed"] for c in cases]), "blamed": share([c["blamed"] for c in cases]),
-            "right_by_kind": {k: right([c for c in cases if c["fault"] == k]) for k in kinds}}
-
-
-def withheld(answers: Path, keys: Path) -> dict[str, Any] | None:
-    """Answers to single effects that the library lacked: right where unknown or a rival truly within D of SAME."""
-    found = []
-    for path in sorted(answers.glob("*.json")):
-        answer, key = (json.loads((folder / path.name).read_text()) for folder in (answers, keys))
-        first = max(answer.get("hypotheses", []), key=lambda h: h["probability"], default=None)
-        found.append({
-            "sigma": key["sigma_w"], "unknown": answer.get("verdict") == "unknown", "named": answer.get("verdict"),
-            "near": (answer.get("verdict") == "explained" and first is not None and not first["unknown"]
-                     and len(first["effects"]) == 1 and key["D"].get(first["effects"][0], math.inf) < SAME)})
-    if not found:
-        return None
-
-    def right(rows: list[dict[str, Any]]) -> float | None:
-        return share([r["unknown"] or r["near"] for r in rows])
-
-    return {"cases": len(found), "right": right(found), "unknown": share([r["unknown"] for r in found]),
-            "near_rival": share([r["near"] for r in found]), "no_gap": share([r["named"] == "no_gap" for r in found]),
-            "right_by_gust": {f"{s:g}": right([r for r in found if r["sigma"] == s]) for s in (0.0, 0.5, 1.5)}}
-
-
-def baselines(answers: Path, keys: Path, cases: Sequence[Case]) -> dict[str, Any]:
+def baselines(answers: Path, keys: Path) -> dict[str, Any]:
     """What knowing nothing scores: the answers dealt to other cases, and "no gap" always."""
-    found = [path for path in sorted(answers.glob("*.json"))
-             if json.loads((keys / path.name).read_text())["tier"] != "faults"]
-    dealt = np.random.default_rng(0).permutation(len(found))
-    permuted = [flat(json.loads(found[i].read_text()), json.loads((keys / path.name).read_text()))
-                for i, path in zip(dealt, found, strict=True)]
+    both = [tuple(json.loads((folder / path.name).read_text()) for folder in (answers, keys))
+            for path in sorted(answers.glob("*.json"))]
+    told, true = zip(*(pair for pair in both if pair[1]["tier"] != "faults"), strict=True)
+    dealt = np.random.default_rng(0).permutation(len(told))
     silent = {"verdict": "no_gap", "hypotheses": [{"effects": [], "unknown": False, "probability": 1.0}],
               "credible_set_95": [0], "effects": [], "where": {"components": {}}, "gap": {"held_out": {}}}
-    always = [flat(silent, json.loads((keys / path.name).read_text())) for path in found]
-    return {"permuted_keys": figures(permuted), "always_no_gap": figures(always)}
+    return {"permuted_keys": figures([flat(told[i], key) for i, key in zip(dealt, true, strict=True)]),
+            "always_no_gap": figures([flat(silent, key) for key in true])}
 
 
 def score(answers: Path, keys: Path, refly: Path | None = None, without: Path | None = None) -> dict[str, Any]:
     """Every figure of the interface, intervals, tiers, mismatched forms (nulls and unknown included) and baselines."""
     everything = load(answers, keys, refly)
+    left_out = load(without, keys) if without is not None and without.is_dir() else []
     cases = [c for c in everything if c["tier"] != "faults"]
-    spoiled = faults([c for c in everything if c["tier"] == "faults"])
     mismatched = [c for c in cases if c["tier"] in ("null", "unknown") or c["other"]]
-    left_out = None if without is None else withheld(without, keys)
-    beside = {"faults": spoiled, "without": left_out}
-    tiers = by_tier(cases) | {name: entry for name, entry in beside.items() if entry is not None}
-    return {**figures(cases), "intervals95": intervals(cases), "by_tier": tiers,
+    return {**figures(cases), "intervals95": intervals(cases), "by_tier": by_tier(everything, left_out),
             "mismatched_form": {**figures(mismatched), "intervals95": intervals(mismatched)},
-            "baselines": baselines(answers, keys, cases)}  # fmt: skip
+            "baselines": baselines(answers, keys)}  # fmt: skip
 
 
 if __name__ == "__main__":
