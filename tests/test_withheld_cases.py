@@ -42,6 +42,13 @@ def test_tiers_gusts_forms_and_effects_are_all_drawn():
     assert abs(spread.mean() - 1.0) < 0.005 and 0.045 < spread.std() < 0.055
 
 
+def test_sizes_stay_within_what_the_protocol_allows():
+    drawn = [part for d in draw.designs(2400, 1) if d.tier == "single" for part in d.parts]
+    ratios = [abs(size / effects.BY_NAME[name].typical) for name, _, size in drawn]
+    assert 0.2 <= min(ratios) and max(ratios) <= 2.5
+    assert set(draw.LARGER) <= {e.name for e in effects.EFFECTS}
+
+
 def test_a_seed_draws_the_same_cases_and_another_one_others():
     assert draw.designs(20, 5) == draw.designs(20, 5)
     assert draw.designs(20, 5) != draw.designs(20, 6)
