@@ -54,6 +54,13 @@ AERODYNAMIC_PARAMETERS: list[Field] = [
     ("induced_drag", "1", "K of CD = CD_0 + K CL^2, for ground effect"),
     ("ground_lift", "1", "relative gain of lift at the ground"),
     ("ground_moment", "1", "moment at the ground (loss of downwash)"),
+    # what no derivative expresses: a description of something unknown (`discrepancy` below)
+    ("CX_elevator", "1/rad", "axial force per elevator"),
+    *((f"{c}_airspeed", "s/m", f"{c} per true airspeed") for c in ("CX", "CZ", "Cm")),
+    *((f"{c}_alpha2", "1/rad2", f"{c} per square of the angle of attack") for c in ("CZ", "Cm")),
+    ("Cm_alpha_elevator", "1/rad2", "Cm per angle of attack times elevator"),
+    *((f"{c}_alpha_beta", "1/rad2", f"{c} per angle of attack times sideslip") for c in ("CY", "Cl", "Cn")),
+    *((f"{c}_time", "1/s", f"growth of {c} since the start") for c in ("CX", "CY", "CZ", "Cl", "Cm", "Cn")),
 ]
 
 CT_MAX = 1.0  # slipstream terms are frozen beyond it; static running would otherwise divide by zero airspeed
@@ -119,3 +126,20 @@ def lateral(alpha: float, beta: float, phat: float, rhat: float, share: float, x
     cn = (p.Cn_0 + c.Cn_beta*beta + c.Cn_p*phat + c.Cn_r*rhat
           + c.Cn_aileron*x.aileron + c.Cn_rudder*x.rudder)
     return cy, cl, cn
+
+
+@kernel
+def discrepancy(alpha: float, beta: float, airspeed: float, x: Any, c: Any, p: Any) -> tuple:
+    """CX, CY, CZ, Cl, Cm, Cn that a description of something unknown adds; exactly 0 with its numbers neutral.
+
+    Terms of a regression on residual coefficients (Klein & Morelli, Aircraft System Identification, section 5.4) that
+    are no derivatives of the model; `c.elapsed`: s since the start.
+    """
+    t, sideways = c.elapsed, alpha*beta
+    cx = p.CX_elevator*x.elevator + p.CX_airspeed*airspeed + p.CX_time*t
+    cy = p.CY_alpha_beta*sideways + p.CY_time*t
+    cz = p.CZ_alpha2*alpha*alpha + p.CZ_airspeed*airspeed + p.CZ_time*t
+    cl = p.Cl_alpha_beta*sideways + p.Cl_time*t
+    cm = alpha*(p.Cm_alpha2*alpha + p.Cm_alpha_elevator*x.elevator) + p.Cm_airspeed*airspeed + p.Cm_time*t
+    cn = p.Cn_alpha_beta*sideways + p.Cn_time*t
+    return cx, cy, cz, cl, cm, cn

@@ -13,7 +13,7 @@ import math
 from typing import Any
 
 from icing_env.actuators import aileron_hinge_moment, elevator_hinge_moment, floated, surface_rate
-from icing_env.aerodynamics import CT_MAX, lateral, longitudinal, separation, smootherstep, tail_angle
+from icing_env.aerodynamics import CT_MAX, discrepancy, lateral, longitudinal, separation, smootherstep, tail_angle
 from icing_env.atmosphere import GAS_CONSTANT, gravity, place_of_static_air, static_air, static_air_near
 from icing_env.frames import angle_of, direction_cosines, to_body, to_local
 from icing_env.jit import block, kernel
@@ -122,14 +122,15 @@ def loads(x: Any, air: tuple, s: Any, c: Any, p: Any) -> tuple:
     cm -= tail*p.Cm_alpha_tail*(alpha_tail + c.alpha_tail_stall)
     cl += 0.5*p.lift_arm*(lift_right - lift_left)
     cn -= 0.5*p.lift_arm*(axial_right - axial_left)
+    more_x, more_y, more_z, more_l, more_m, more_n = discrepancy(alpha, beta, airspeed, x, c, p)
 
     bluff = 0.5*density*airspeed*p.wing_area*c.CD_parasite
-    fx = qs*(0.5*(axial_left + axial_right) + rest_x) - bluff*ua + thrust
-    fy = qs*cy - bluff*va
-    fz = qs*(0.5*(lift_left + lift_right) + rest_z) - bluff*wa
-    roll = qs*p.span*cl - p.cg_shift_y*fz + p.cg_shift_z*fy
-    pitch = qs*p.chord*cm - p.cg_shift_z*fx + p.cg_shift_x*fz + p.engine_arm_z*thrust
-    yaw = qs*p.span*cn - p.cg_shift_x*fy + p.cg_shift_y*fx + p.engine_arm_y*(thrust_left - thrust_right)
+    fx = qs*(0.5*(axial_left + axial_right) + rest_x + more_x) - bluff*ua + thrust
+    fy = qs*(cy + more_y) - bluff*va
+    fz = qs*(0.5*(lift_left + lift_right) + rest_z + more_z) - bluff*wa
+    roll = qs*p.span*(cl + more_l) - p.cg_shift_y*fz + p.cg_shift_z*fy
+    pitch = qs*p.chord*(cm + more_m) - p.cg_shift_z*fx + p.cg_shift_x*fz + p.engine_arm_z*thrust
+    yaw = qs*p.span*(cn + more_n) - p.cg_shift_x*fy + p.cg_shift_y*fx + p.engine_arm_y*(thrust_left - thrust_right)
     hinge_e = elevator_hinge_moment(qbar, alpha_tail, tail, x, p)
     hinge_a = aileron_hinge_moment(qbar, left, right, x, p)
     return (fx, fy, fz, roll, pitch, yaw, airspeed, alpha, beta, density, thrust_left, thrust_right,

@@ -7,7 +7,7 @@ moments). The boom oscillates at 7 Hz and a 10 Hz low pass is applied in flight 
 every fast channel alike, controls included, so that filtering shifts none against another. Flow angles and
 accelerations are corrected to the c.g., as in the records.
 
-measured = (1 + scale) x (truth behind lag, boom and filter) + bias + noise
+measured = (1 + scale) x (truth behind lag, boom and filter - delay x its rate) + bias + drift x time + noise
 """
 
 from __future__ import annotations
@@ -25,13 +25,17 @@ from icing_env.types import Field
 NOISY = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "psi", "ax", "ay", "az", "elevator", "aileron",
          "rudder", "thrust", "pressure", "temperature", "lwc", "mvd", "hinge_moment")  # fmt: skip
 BIASED = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "ax", "ay", "az", "elevator", "aileron", "rudder",
-          "pressure", "temperature")  # fmt: skip
-SCALED = ("airspeed", "alpha", "beta", "p", "q", "r", "ax", "ay", "az", "thrust")
+          "pressure", "temperature", "altitude")  # fmt: skip
+SCALED = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "ax", "ay", "az", "altitude", "thrust")
+DELAYED = ("alpha", "beta", "p", "q", "r", "phi", "theta")
+DRIFTING = ("airspeed", *DELAYED, "ax", "ay", "az", "altitude")
 
 SENSOR_PARAMETERS: list[Field] = [
     *((f"noise_{c}", "of the channel", "standard deviation of the noise") for c in NOISY),
     *((f"bias_{c}", "of the channel", "constant error") for c in BIASED),
     *((f"scale_{c}", "1", "relative error") for c in SCALED),
+    *((f"delay_{c}", "s", "delay of the reading, to first order; negative: the reading leads") for c in DELAYED),
+    *((f"drift_{c}", "of the channel per s", "growth of its error since the start") for c in DRIFTING),
     ("pitot_lag", "s", "time constant of the airspeed"),
     ("pitot_alpha", "1/rad", "position error: relative airspeed error per angle of attack"),
     ("vane_lag", "s", "time constant of the flow vanes"),
@@ -54,6 +58,7 @@ def hold_filter_constants(s: Any, p: Any, dt: float) -> None:
     """Constants of lags, low pass and boom for a step `dt`; the boom's are its exact transition matrix."""
     s.gain_pitot, s.gain_vane = lag_gain(dt, p.pitot_lag), lag_gain(dt, p.vane_lag)
     s.gain_filter = 1.0 - math.exp(-2.0*math.pi*p.filter_frequency*dt)
+    s.filter_rate = s.gain_filter/((1.0 - s.gain_filter)*dt) if s.gain_filter < 1.0 else 0.0
     omega, zeta = 2.0*math.pi*p.boom_frequency, p.boom_damping
     damped = omega*math.sqrt(1.0 - zeta*zeta)
     decay = math.exp(-zeta*omega*dt)
@@ -111,19 +116,37 @@ def filter_flow_and_inertial(x: Any, s: Any, c: Any, p: Any, airspeed: float, al
 
 @kernel
 def read_quietly(s: Any, m: Any, p: Any) -> None:
-    """Flow, inertial and surface channels without their noise: scale and bias."""
-    m.airspeed = (1.0 + p.scale_airspeed)*s.pitot + p.bias_airspeed
-    m.alpha = (1.0 + p.scale_alpha)*s.filtered_alpha + p.bias_alpha
-    m.beta = (1.0 + p.scale_beta)*s.filtered_beta + p.bias_beta
+    """Flow, inertial and surface channels without their noise: delay, scale, bias and drift (to `m.time`)."""
+    rate, t = s.filter_rate, m.time
+    alpha = s.filtered_alpha - p.delay_alpha*rate*(s.vane_alpha + s.boom_position - s.filtered_alpha)
+    beta = s.filtered_beta - p.delay_beta*rate*(s.vane_beta - s.filtered_beta)
+    roll = s.filtered_p - p.delay_p*rate*(s.p - s.filtered_p)
+    pitch = s.filtered_q - p.delay_q*rate*(s.q - s.filtered_q)
+    yaw = s.filtered_r - p.delay_r*rate*(s.r - s.filtered_r)
+    m.airspeed = (1.0 + p.scale_airspeed)*s.pitot + p.bias_airspeed + p.drift_airspeed*t
+    m.alpha = (1.0 + p.scale_alpha)*alpha + p.bias_alpha + p.drift_alpha*t
+    m.beta = (1.0 + p.scale_beta)*beta + p.bias_beta + p.drift_beta*t
     m.elevator = s.filtered_elevator + p.bias_elevator
-    m.p = (1.0 + p.scale_p)*s.filtered_p + p.bias_p
-    m.q = (1.0 + p.scale_q)*s.filtered_q + p.bias_q
-    m.r = (1.0 + p.scale_r)*s.filtered_r + p.bias_r
+    m.p = (1.0 + p.scale_p)*roll + p.bias_p + p.drift_p*t
+    m.q = (1.0 + p.scale_q)*pitch + p.bias_q + p.drift_q*t
+    m.r = (1.0 + p.scale_r)*yaw + p.bias_r + p.drift_r*t
     m.aileron = s.filtered_aileron + p.bias_aileron
-    m.ax = (1.0 + p.scale_ax)*s.filtered_ax + p.bias_ax
-    m.ay = (1.0 + p.scale_ay)*s.filtered_ay + p.bias_ay
-    m.az = (1.0 + p.scale_az)*s.filtered_az + p.bias_az
+    m.ax = (1.0 + p.scale_ax)*s.filtered_ax + p.bias_ax + p.drift_ax*t
+    m.ay = (1.0 + p.scale_ay)*s.filtered_ay + p.bias_ay + p.drift_ay*t
+    m.az = (1.0 + p.scale_az)*s.filtered_az + p.bias_az + p.drift_az*t
     m.rudder = s.filtered_rudder + p.bias_rudder
+
+
+@kernel
+def read_gyros_quietly(x: Any, m: Any, p: Any, phi: float, theta: float) -> None:
+    """Bank and pitch without their noise, from the true ones: as `read_quietly`, delayed by their own rates."""
+    attitude = direction_cosines(x.e0, x.e1, x.e2, x.e3)
+    across = attitude[5]*x.q + attitude[8]*x.r  # cos(theta) (q sin(phi) + r cos(phi))
+    plane = max(attitude[5]*attitude[5] + attitude[8]*attitude[8], 1e-9)
+    phi_rate = x.p - attitude[2]*across/plane
+    theta_rate = (attitude[8]*x.q - attitude[5]*x.r)/math.sqrt(plane)
+    m.phi = (1.0 + p.scale_phi)*(phi - p.delay_phi*phi_rate) + p.bias_phi + p.drift_phi*m.time
+    m.theta = (1.0 + p.scale_theta)*(theta - p.delay_theta*theta_rate) + p.bias_theta + p.drift_theta*m.time
 
 
 @kernel
@@ -154,8 +177,9 @@ def read_attitude(x: Any, s: Any, m: Any, p: Any, u: Any) -> float:
     turn = psi - m.psi
     psi = m.psi + turn - 2.0*math.pi*math.floor(turn*(0.5/math.pi) + 0.5)
     n0, n1, n2, n3 = normal4(s.seed, STREAM_SENSORS, s.step, BLOCK[3])
-    m.phi = phi + p.bias_phi + p.noise_phi*n0
-    m.theta = theta + p.bias_theta + p.noise_theta*n1
+    read_gyros_quietly(x, m, p, phi, theta)
+    m.phi += p.noise_phi*n0
+    m.theta += p.noise_theta*n1
     m.psi = psi + p.noise_psi*n2
     m.flap = x.flap
     m.throttle_left, m.throttle_right = u.throttle_left, u.throttle_right
@@ -173,7 +197,8 @@ def read_engines_and_navigation(x: Any, attitude: tuple, s: Any, m: Any, p: Any,
     m.hinge_moment_elevator = hinge_e + p.noise_hinge_moment*n2
     m.hinge_moment_aileron = hinge_a + p.noise_hinge_moment*n3
     m.pressure = static + p.bias_pressure + p.noise_pressure*noise
-    m.altitude = pressure_altitude(m.pressure)
+    m.altitude = ((1.0 + p.scale_altitude)*pressure_altitude(m.pressure) + p.bias_altitude
+                  + p.drift_altitude*m.time)
     m.torque_left, m.torque_right = torque(x.power_left, p), torque(x.power_right, p)
     m.rpm_left, m.rpm_right = p.propeller_rpm, p.propeller_rpm
     north, east, _down = to_local(attitude, x.u, x.v, x.w)

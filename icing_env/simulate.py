@@ -39,7 +39,7 @@ from icing_env.integrate import AFTER, BEFORE, GUST_RECORDS, GUSTS, RECORDS, TRI
 from icing_env.jit import entry, kernel
 from icing_env.lanes import LANES, lane
 from icing_env.memory import call_at, matrix, rows
-from icing_env.parameters import PARAMETERS
+from icing_env.parameters import N_IN_MOTION, PARAMETERS
 from icing_env.sensors import hold_filter_constants, read_instruments, start_instruments
 from icing_env.turbulence import advance_turbulence, start_turbulence
 from icing_env.types import COMMAND, CONTINUOUS, CURRENT, MEASUREMENT, OUTCOME, STATE
@@ -66,6 +66,7 @@ def prepare(s: Any, c: Any, p: Any, u: Any, o: Any, dt: float, one_hertz: int) -
         hold_filter_constants(s, p, dt)
     advance_protection(s, p, u, dt)
     present_aircraft(s, p, c)
+    c.elapsed = s.step*dt
     advance_turbulence(s, p, o.airspeed, dt)
 
 
@@ -116,7 +117,7 @@ def advance_blocks(table: Any) -> None:
     clock, shared = clocks[0], len(parameters) == 1
     dt, step = clock.dt, clock.dt/clock.substeps
     for j in range(LANES if shared else 0):
-        fill(block, AT_PARAMETERS, j, settings[0])
+        fill(block, AT_PARAMETERS, j, settings[0][:N_IN_MOTION])
     for first in range(0, len(state), LANES):
         count = min(LANES, len(state) - first)
         for j in range(count):
@@ -129,7 +130,7 @@ def advance_blocks(table: Any) -> None:
             fill(block, AT_CURRENT, j, currents[i])
             fill(block, AT_COMMAND, j, commands[i])
             if not shared:
-                fill(block, AT_PARAMETERS, j, settings[i])
+                fill(block, AT_PARAMETERS, j, settings[i][:N_IN_MOTION])
         for k in range(clock.substeps):
             rk4_block(block, count, step, k, clock.substeps)
         for j in range(count):
@@ -151,6 +152,7 @@ def start(state: Any, measurement: Any, current: Any, parameters: Any, command: 
         if s.temperature <= 0.0:  # not prescribed
             s.temperature = static_air(s.altitude)[0] + p.temperature_offset
         present_aircraft(s, p, c)
+        c.elapsed = s.step*dt
         attitude = direction_cosines(s.e0, s.e1, s.e2, s.e3)
         start_turbulence(s, p, air_data(s, attitude, s, p)[0])
         felt = forces(s, attitude, s, c, p)

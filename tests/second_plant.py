@@ -26,8 +26,7 @@ WING_AND_VTAIL = ("CY_beta", "CY_p", "CY_r", "CY_rudder", "Cl_beta", "Cl_p", "Cl
                   "Cn_beta", "Cn_p", "Cn_r", "Cn_aileron", "Cn_rudder")  # fmt: skip
 
 RADIUS, R, G0, T0, P0, LAPSE, H11 = 6356766.0, 287.05287, 9.80665, 288.15, 101325.0, 0.0065, 11000.0
-T11 = T0 - LAPSE * H11
-POWER = G0 / (R * LAPSE)
+T11, POWER = T0 - LAPSE * H11, G0 / (R * LAPSE)
 P11 = P0 * (T11 / T0) ** POWER
 
 
@@ -66,9 +65,7 @@ def iced_aircraft(s: Record, p: Record) -> Record:
     def factor(*pairs: tuple[str, Any]) -> Any:
         return np.maximum(1 + sum(k[f"k_{name}"] * eta for name, eta in pairs), p.ice_factor_floor)
 
-    c = {}
-    for name in WING_AND_HTAIL:
-        c[name] = k[name] * factor((f"{name}_wing", wing), (f"{name}_htail", s.eta_htail))
+    c = {name: k[name] * factor((f"{name}_wing", wing), (f"{name}_htail", s.eta_htail)) for name in WING_AND_HTAIL}
     for name in WING_AND_VTAIL:
         c[name] = k[name] * factor((f"{name}_wing", wing), (f"{name}_vtail", s.eta_vtail))
     for side, eta in (("left", s.eta_left_wing), ("right", s.eta_right_wing)):
@@ -80,6 +77,7 @@ def iced_aircraft(s: Record, p: Record) -> Record:
     c["CD_parasite"] = p.CD_parasite + sum(k[f"k_CD_parasite_{part}"] * vars(s)[f"eta_{part}"] for part in bluff)
     c["efficiency"] = factor(("efficiency_propeller", s.eta_propeller))
     c["mass"] = p.mass + sum(vars(s)[f"ice_mass_{surface}"] for surface in SURFACES)
+    c["elapsed"] = s.step * 0.02  # of environment steps of 0.02 s
     return Record(**c)
 
 
@@ -178,8 +176,10 @@ def longitudinal(x: Record, a: Record, f: Record, h: Record, ct: Any, c: Record,
     flap_lift = (1 - f.share) * p.CL_flap * x.flap
     flap_drag = p.CD_flap * x.flap + p.induced_drag * flap_lift * (flap_lift - 2 * Z_wing)
     CX = (h.X_left + h.X_right) / 2 + flap_lift * a.sin_a - flap_drag * a.cos_a + low * p.induced_drag * Z_wing**2
+    CX += p.CX_elevator * x.elevator + p.CX_airspeed * a.V + p.CX_time * c.elapsed
     CZ = (Z_wing - flap_lift * a.cos_a - flap_drag * a.sin_a
           + c.CZ_q * a.qhat + c.CZ_elevator * x.elevator + p.CZ_CT * ct + low * p.ground_lift * Z_wing)  # fmt: skip
+    CZ += p.CZ_alpha2 * a.alpha**2 + p.CZ_airspeed * a.V + p.CZ_time * c.elapsed
     Cm = (c.Cm_0 + c.Cm_alpha * ((1 - f.share) * a.alpha + f.share * p.Cm_alpha_separated * a.sin_a)
           + (c.Cm_q - p.Cm_alphadot) * a.qhat
           + p.Cm_alphadot * (p.chord / (2 * p.tail_arm)) * (a.alpha - x.alpha_downwash)
@@ -187,7 +187,8 @@ def longitudinal(x: Record, a: Record, f: Record, h: Record, ct: Any, c: Record,
           + c.Cm_elevator * x.elevator * (1 + p.Cm_elevator_CT * ct) * (1 - p.tail_stall_elevator_loss * f.tail)
           + p.Cm_flap * x.flap + p.Cm_CT * ct + low * p.ground_moment
           - f.tail * p.Cm_alpha_tail * (f.alpha_tail + c.alpha_tail_stall))  # fmt: skip
-    return CX, CZ, Cm
+    Cm += p.Cm_alpha2 * a.alpha**2 + p.Cm_alpha_elevator * a.alpha * x.elevator
+    return CX, CZ, Cm + p.Cm_airspeed * a.V + p.Cm_time * c.elapsed
 
 
 def lateral(x: Record, a: Record, f: Record, h: Record, c: Record, p: Record) -> tuple[Any, Any, Any]:
@@ -198,7 +199,9 @@ def lateral(x: Record, a: Record, f: Record, h: Record, c: Record, p: Record) ->
           + loss * (c.Cl_p * a.phat + c.Cl_aileron * x.aileron) + p.lift_arm * (h.Z_right - h.Z_left) / 2)  # fmt: skip
     Cn = (p.Cn_0 + c.Cn_beta * a.beta + c.Cn_p * a.phat + c.Cn_r * a.rhat + c.Cn_aileron * x.aileron
           + c.Cn_rudder * x.rudder - p.lift_arm * (h.X_right - h.X_left) / 2)  # fmt: skip
-    return CY, Cl, Cn
+    ab, t = a.alpha * a.beta, c.elapsed
+    return (CY + p.CY_alpha_beta * ab + p.CY_time * t, Cl + p.Cl_alpha_beta * ab + p.Cl_time * t,
+            Cn + p.Cn_alpha_beta * ab + p.Cn_time * t)  # fmt: skip
 
 
 # ---- sections 10 to 13
@@ -231,12 +234,9 @@ def rigid_body(x: Record, C: list[list[Any]], g: Any, load: tuple[Any, ...], c: 
         x.r * x.v - x.q * x.w + C[0][2] * g + Fx / m,
         x.p * x.w - x.r * x.u + C[1][2] * g + Fy / m,
         x.q * x.u - x.p * x.v + C[2][2] * g + Fz / m,
-        -(x.e1 * x.p + x.e2 * x.q + x.e3 * x.r) / 2,
-        (x.e0 * x.p + x.e2 * x.r - x.e3 * x.q) / 2,
-        (x.e0 * x.q + x.e3 * x.p - x.e1 * x.r) / 2,
-        (x.e0 * x.r + x.e1 * x.q - x.e2 * x.p) / 2,
-        (Izz * rolling + Ixz * yawing) / D,
-        (M + (Izz - Ixx) * x.p * x.r - Ixz * (x.p**2 - x.r**2)) / Iyy,
+        -(x.e1 * x.p + x.e2 * x.q + x.e3 * x.r) / 2, (x.e0 * x.p + x.e2 * x.r - x.e3 * x.q) / 2,
+        (x.e0 * x.q + x.e3 * x.p - x.e1 * x.r) / 2, (x.e0 * x.r + x.e1 * x.q - x.e2 * x.p) / 2,
+        (Izz * rolling + Ixz * yawing) / D, (M + (Izz - Ixx) * x.p * x.r - Ixz * (x.p**2 - x.r**2)) / Iyy,
         (Ixx * yawing + Ixz * rolling) / D,
     ]  # fmt: skip
 
@@ -267,8 +267,8 @@ def actuators(x: Record, a: Record, f: Record, p: Record, u: Record) -> list[Any
         slew(x.aileron, aileron, p.aileron_min, p.aileron_max, p.aileron_lag, p.aileron_rate),
         slew(x.rudder, rudder, p.rudder_min, p.rudder_max, p.rudder_lag, p.rudder_rate),
         slew(x.flap, u.flap, 0, p.flap_max, 0.2, p.flap_rate),
-        (full * clip(u.throttle_left, 0, 1) - x.power_left) / p.spool_time,
-        (full * clip(u.throttle_right, 0, 1) - x.power_right) / p.spool_time,
+        *((full * clip(lever, 0, 1) - now) / p.spool_time
+          for lever, now in ((u.throttle_left, x.power_left), (u.throttle_right, x.power_right))),
     ]
 
 
@@ -293,8 +293,7 @@ def fly(y: NDArray, seconds: float, before: Record, after: Record, c: Record, p:
 
     scale = 1e-11 * np.array([1e3, 1e3, 1e3, 50, 50, 50, *[1] * 4, *[0.1] * 3, *[0.1] * 4, 1e5, 1e5, 0.1])
     solution = solve_ivp(slope, (0, seconds), y, "DOP853", rtol=1e-11, atol=scale, first_step=seconds)
-    if not solution.success:
-        raise ArithmeticError(solution.message)
+    assert solution.success, solution.message
     y = solution.y[:, -1]
     y[6:10] /= np.sqrt(np.sum(y[6:10] ** 2))
     return y

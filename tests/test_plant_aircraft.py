@@ -249,4 +249,4 @@ def test_every_coefficient_of_the_moment_is_written() -> None:
     fleet.state[:] = level(1, 70.0)
     fleet.start()
     zero = {name for name in CURRENT.names if float(fleet.current[name][0]) == 0.0}
-    assert zero <= {"CD_parasite", "CY_p"}
+    assert zero <= {"CD_parasite", "CY_p", "elapsed"}

@@ -17,7 +17,9 @@ from icing_env.types import COMMAND, CONTINUOUS, STATE
 AIRCRAFT = ("twin_otter", "twin_otter_flight")
 SIGNED = {"wind_": 15.0, "_shear": 0.02, "cg_shift_": 0.3, "CY_0": 0.02, "Cl_0": 0.02, "Cn_0": 0.02, "Cl_alpha": 0.1,
           "CY_p": 0.3, "Cm_CT": 0.1, "_offset": 0.05, "temperature_offset": 20.0, "hinge_aileron_alpha": 0.1, "k_": 0.5,
-          "ground_altitude": 1000.0, "CD_parasite": 0.03, "wind_reference_altitude": 2000.0}  # fmt: skip
+          "ground_altitude": 1000.0, "CD_parasite": 0.03, "wind_reference_altitude": 2000.0,
+          "CX_elevator": 0.2, "_airspeed": 1e-3, "CZ_alpha2": 2.0, "Cm_alpha2": 2.0, "_alpha_elevator": 2.0,
+          "_alpha_beta": 0.3, "_time": 1e-3}  # fmt: skip
 GUSTS = {"gust_u": 8.0, "gust_v": 8.0, "gust_w": 8.0, "gust_w_tail": 8.0, "gust_p": 0.3, "gust_q": 0.3, "gust_r": 0.3}
 # Sizes that errors of a flight are measured by: distance flown, 50 m/s, 1, 0.5 rad/s, travel of each surface, 200 kW.
 SCALES = np.array([4e3] * 3 + [50.0] * 3 + [1.0] * 4 + [0.5] * 3 + [0.698, 0.58, 0.56, 0.654] + [2e5] * 2 + [0.2])
@@ -49,6 +51,7 @@ def anywhere(rng: np.random.Generator, p: Record, V: NDArray, alpha: NDArray) ->
     s, u = np.zeros(n, STATE), np.zeros(n, COMMAND)
     low = rng.random(n) < 0.2  # near the ground
     s["altitude"] = np.where(low, p.ground_altitude + rng.uniform(0, 40, n), rng.uniform(0, 14000, n))
+    s["step"] = rng.integers(0, 10000, n)
     s["north"], s["east"] = rng.uniform(-1e5, 1e5, (2, n))
     attitude = rng.normal(size=(4, n))
     s["e0"], s["e1"], s["e2"], s["e3"] = attitude / np.linalg.norm(attitude, axis=0)
@@ -153,7 +156,7 @@ def test_rates_agree_backwards_at_rest_and_below_the_ground() -> None:
 
 def test_comparison_notices_every_number() -> None:
     """A change of 1e-4 in any one number is far above the tolerance in some state, but in those that act on no rate."""
-    rng, n = np.random.default_rng(6), 400
+    rng, n = np.random.default_rng(6), 2000
     values = altered("twin_otter", n, rng)
     p = Record(**(second_plant.parameters() | values))
     s, u = anywhere(rng, p, rng.uniform(5, 110, n), np.radians(rng.uniform(-30, 40, n)))

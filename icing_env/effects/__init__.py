@@ -27,6 +27,7 @@ from icing_env.effects import (
     cg_shift,
     dihedral_effect,
     directional_stability,
+    discrepancy,
     downwash_lag,
     drag_due_to_lift,
     early_stall,
@@ -124,16 +125,21 @@ LIBRARY: dict[str, Effect] = {
     )
 }
 
+# Ways of flying a description, which are no explanation and are never searched for.
+DESCRIPTIONS: dict[str, Effect] = {discrepancy.EFFECT.name: discrepancy.EFFECT}
+
 
 def get(name: str) -> Effect:
-    """The effect of that name.
+    """The effect of that name, of the library or a description.
 
     Raises:
         InputError: there is none; the nearest is named.
     """
-    if name not in LIBRARY:
-        raise InputError(f"no effect '{name}': {nearest(name, list(LIBRARY))}")
-    return LIBRARY[name]
+    if name in LIBRARY:
+        return LIBRARY[name]
+    if name in DESCRIPTIONS:
+        return DESCRIPTIONS[name]
+    raise InputError(f"no effect '{name}': {nearest(name, [*LIBRARY, *DESCRIPTIONS])}")
 
 
 def with_effects(parameters: NDArray, effects: Mapping[str, Mapping[str, float | NDArray]]) -> NDArray:
@@ -184,4 +190,4 @@ def _example(effect: Effect) -> str:
     return ",".join(f"{p.name}={p.typical:g}" for p in effect.parameters)
 
 
-__all__ = ["LIBRARY", "Effect", "Parameter", "get", "parse", "with_effects"]
+__all__ = ["DESCRIPTIONS", "LIBRARY", "Effect", "Parameter", "get", "parse", "with_effects"]

@@ -22,6 +22,7 @@ def command(as_json: bool, seed: int) -> None:
     """List the ways in which an aircraft may differ from its model.
 
     Each effect has physical parameters, neutral by default: `icing fly --effect NAME:PARAMETER=VALUE` flies with it.
+    Beside these, `discrepancy` flies what a diagnosis describes but cannot name (docs/model.md, section 20).
     Nothing is drawn at random here; --seed changes nothing.
     """
     from icing_env.effects import LIBRARY

@@ -1,0 +1,89 @@
+"""Whatever the library lacks, written as terms of coefficients and errors of channels: how an unknown is flown.
+
+A diagnosis that finds nothing in the library describes the gap by a regression on residual coefficients (constant,
+linear and nonlinear terms, growth with time; Klein & Morelli, Aircraft System Identification, AIAA 2006, section 5.4).
+This effect flies such a description. It belongs to no library: it explains nothing.
+
+A term is a product of deviations from the condition `at_*`; multiplied out it changes the parameters of its factors.
+"""
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icing_env.effects.effect import Effect, Parameter, Values
+from icing_env.sensors import BIASED, DELAYED, DRIFTING, SCALED
+from icing_env.types import unit_of
+
+SIDEWAYS = ("0", "beta", "p", "r", "aileron", "rudder", "alpha_beta", "time")
+TERMS: dict[str, tuple[str, ...]] = {
+    "CX": ("0", "alpha", "alpha_alpha", "elevator", "airspeed", "time"),
+    "CY": tuple(term for term in SIDEWAYS if term != "aileron"),
+    "CZ": ("0", "alpha", "q", "elevator", "alpha_alpha", "airspeed", "time"),
+    "Cl": SIDEWAYS,
+    "Cm": ("0", "alpha", "q", "elevator", "alpha_alpha", "alpha_elevator", "airspeed", "time"),
+    "Cn": SIDEWAYS,
+}
+AT = {"alpha": "rad", "elevator": "rad", "airspeed": "m/s", "time": "s", "phi": "rad", "theta": "rad", "ax": "m/s2",
+      "ay": "m/s2", "az": "m/s2", "altitude": "m"}  # fmt: skip
+CHANNELS = DRIFTING  # those of which an error can be described: airspeed to altitude
+LARGEST = 1e3  # either way, of everything (no range is searched)
+
+
+def apply(p: NDArray, values: Values) -> None:
+    for coefficient, terms in TERMS.items():
+        for term in terms:
+            _add(p, coefficient, () if term == "0" else tuple(term.split("_")), values)
+    for channel in CHANNELS:
+        scale, drift = values[f"scale_{channel}"], values[f"drift_{channel}"]
+        p[f"bias_{channel}"] += values[f"bias_{channel}"] - scale*values.get(f"at_{channel}", 0.0)
+        p[f"bias_{channel}"] -= drift*values["at_time"]
+        p[f"scale_{channel}"] += scale
+        p[f"drift_{channel}"] += drift
+    for channel in DELAYED:
+        p[f"delay_{channel}"] += values[f"delay_{channel}"]
+    p["pitot_lag"] = np.maximum(p["pitot_lag"] + values["delay_airspeed"], 0.0)
+
+
+def _add(p: NDArray, coefficient: str, factors: tuple[str, ...], values: Values) -> None:
+    """One term, multiplied out: of every factor either the quantity itself or less its value of reference."""
+    size = values["_".join((coefficient, *(factors or ("0",))))]
+    for kept in product(*((True, False) if f"at_{f}" in values else (True,) for f in factors)):
+        left = [f for f, keep in zip(factors, kept, strict=True) if keep]
+        change = size
+        for factor, keep in zip(factors, kept, strict=True):
+            if not keep:
+                change = -change*values[f"at_{factor}"]
+        name = "_".join(left) or "0"
+        p[f"{coefficient}_{'alpha2' if name == 'alpha_alpha' else name}"] += change
+
+
+def unit(coefficient: str, term: str) -> str:
+    """Unit of one term's size: per rad of every angle and normalised rate, per m/s, per s."""
+    if term in ("airspeed", "time"):
+        return "s/m" if term == "airspeed" else "1/s"
+    return "1/rad2" if "_" in term else unit_of(f"{coefficient}_{term}")
+
+
+def _number(name: str, unit: str) -> Parameter:
+    return Parameter(name, unit, neutral=0.0, typical=0.0, low=-LARGEST, high=LARGEST)
+
+
+EFFECT = Effect(
+    name="discrepancy",
+    component="aerodynamics",
+    enters_at=("x_force", "y_force", "z_force", "rolling_moment", "pitching_moment", "yawing_moment",
+               *(f"sensor:{channel}" for channel in CHANNELS)),
+    description="Terms of force and moment coefficients and errors of channels, as a diagnosis describes an unknown",
+    source="docs/model.md, section 20",
+    parameters=(
+        *(_number(f"{c}_{term}", unit(c, term)) for c, terms in TERMS.items() for term in terms),
+        *(_number(f"bias_{c}", "of the channel") for c in CHANNELS if c in BIASED),
+        *(_number(f"scale_{c}", "1") for c in CHANNELS if c in SCALED),
+        *(_number(f"delay_{c}", "s") for c in ("airspeed", *DELAYED)),
+        *(_number(f"drift_{c}", "of the channel per s") for c in CHANNELS),
+        *(Parameter(f"at_{name}", u, neutral=0.0, typical=0.0, low=-1e5, high=1e5) for name, u in AT.items()),
+    ),
+    apply=apply,
+)
