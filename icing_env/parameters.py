@@ -41,15 +41,15 @@ GROUPS: dict[str, list[Field]] = {
     "actuators": ACTUATOR_PARAMETERS,
     "earth": EARTH_PARAMETERS,
     "wind": WIND_PARAMETERS,
+    "cloud": CLOUD_PARAMETERS,
     "severity": SEVERITY_PARAMETERS,
     "accretion": ACCRETION_PARAMETERS,
     "ice_protection": PROTECTION_PARAMETERS,
     "sensors": SENSOR_PARAMETERS,
     "turbulence": TURBULENCE_PARAMETERS,
-    "cloud": CLOUD_PARAMETERS,
 }
 # What the equations of motion read comes first: `icing_env.blocks` takes no more than that.
-IN_MOTION = ("mass", "aerodynamics", "propulsion", "actuators", "earth", "wind")
+IN_MOTION = ("mass", "aerodynamics", "propulsion", "actuators", "earth", "wind", "cloud")
 N_IN_MOTION = sum(len(GROUPS[group]) for group in IN_MOTION)
 PARAMETER_FIELDS: list[Field] = [field for group in GROUPS.values() for field in group]
 PARAMETERS = structured(PARAMETER_FIELDS)

@@ -32,7 +32,7 @@ from icing_env.jit import entry, kernel
 from icing_env.lanes import LANES, lane
 from icing_env.memory import matrix, rows
 from icing_env.parameters import PARAMETERS
-from icing_env.sensors import filter_flow_and_inertial, read_quietly
+from icing_env.sensors import filter_flow_and_inertial, read_gyros_quietly, read_quietly
 from icing_env.simulate import CLOCK, NUMBER
 from icing_env.turbulence import advance_turbulence, drift_turbulence
 from icing_env.types import COMMAND, CONTINUOUS, CURRENT, MEASUREMENT, OUTCOME, STATE
@@ -72,6 +72,9 @@ _FLAP_ASKED = int(columns(COMMAND, ("flap",))[0])
 _EFFICIENCY, _STATIC, _FACTOR_L, _FACTOR_R = (int(c) for c in columns(
     PARAMETERS, ("propeller_efficiency", "propeller_static_speed", "thrust_factor_left",
                  "thrust_factor_right")))  # fmt: skip
+_SCALE, _BIAS, _DRIFT = (int(c) for c in columns(
+    PARAMETERS, ("scale_altitude", "bias_altitude", "drift_altitude")))  # fmt: skip
+_TIME, _ELAPSED = int(columns(MEASUREMENT, ("time",))[0]), int(columns(CURRENT, ("elapsed",))[0])
 _N_STATE, _N_MEASUREMENT = len(STATE.names or ()), len(MEASUREMENT.names or ())
 _N_PARAMETERS, _N_COMMAND, _N_CURRENT = (len(kind.names or ()) for kind in (PARAMETERS, COMMAND, CURRENT))
 
@@ -93,7 +96,7 @@ def read(out: Any, x: Any, y: Any, p: Any) -> None:
     """What one row's instruments should read, in the order of MEASURED."""
     for c in range(11):
         out[c] = y[_Y[c]]
-    out[11] = x[_ALTITUDE]
+    out[11] = (1.0 + p[_SCALE])*x[_ALTITUDE] + p[_BIAS] + p[_DRIFT]*y[_TIME]
     per_power = p[_EFFICIENCY] / np.sqrt((x[_U] - x[_GUST_U])**2 + p[_STATIC]**2)
     out[12] = p[_FACTOR_L] * x[_POWER_L] * per_power
     out[13] = p[_FACTOR_R] * x[_POWER_R] * per_power
@@ -111,14 +114,14 @@ def turn(x: Any, phi: float, roll: float, pitch: float) -> None:
 
 
 @kernel
-def sense(s: Any, m: Any, c: Any, p: Any, felt: tuple) -> None:
+def sense(s: Any, m: Any, c: Any, p: Any, felt: tuple, dt: float) -> None:
     """Instruments of one row at the end of a step, without noise: the fast channels and the attitude."""
+    m.time = s.step*dt
     fx, fy, fz, airspeed, alpha, beta = felt[0], felt[1], felt[2], felt[6], felt[7], felt[8]
     filter_flow_and_inertial(s, s, c, p, airspeed, alpha, beta, fx, fy, fz)
     read_quietly(s, m, p)
     phi, theta, _psi = euler_angles(s.e0, s.e1, s.e2, s.e3)
-    m.phi = phi + p.bias_phi
-    m.theta = theta + p.bias_theta
+    read_gyros_quietly(s, m, p, phi, theta)
 
 
 @kernel
@@ -197,10 +200,12 @@ def along(table: Any, controls: Any, first: Any, measured: Any, stretch: Any, ga
                 if k % PRESENTED == 0:
                     present_aircraft(states[i], parameters[i], currents[i])
                     fill(block, AT_CURRENT, j, held[i])
+                block[(AT_CURRENT + _ELAPSED)*LANES + j] = states[i].step*clock.dt
             advance(block, states[at:], parameters[at:], speeds[at:], count, clock.dt, clock.substeps)
             for j in range(count):
                 i = at + j
-                sense(states[i], readings[i], currents[i], parameters[i], recall_loads(block, j))
+                sense(states[i], readings[i], currents[i], parameters[i], recall_loads(block, j),
+                      clock.dt)
                 read(out[k, i], x[i], y[i], p[i])
             for j in range(len(error)):
                 if at <= error_at[j, 0] < at + count:

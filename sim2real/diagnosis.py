@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from icing_env import aircraft, effects
 from icing_env.errors import InputError, nearest
@@ -18,14 +17,14 @@ from icing_env.record import DataProblem, FlightRecord
 from sim2real import gap
 from sim2real.attribution import P_NONE, P_UNKNOWN, Posterior
 from sim2real.candidates import SPREAD, Bank, bank, not_testable
+from sim2real.discrepancy import describe_unknown, described
 from sim2real.evidence import Evidence
 from sim2real.manoeuvre import next_manoeuvre
 from sim2real.reconstruct import Reconstruction, reconstruct
 from sim2real.references import Baseline, fit_baseline
-from sim2real.sets import SetFit
+from sim2real.remedy import Remedy, leading, remedy, resimulation, values_of
 from sim2real.weigh import Progress, fit
-from sim2real.where import components, describe_unknown, regimes
-from sim2real.windows import FREE, cut
+from sim2real.where import components, regimes
 
 LISTED = 0.01  # effects at least this probable are described one by one
 
@@ -59,7 +58,7 @@ class Details:
     held_out: tuple[Reconstruction, ...]
     evidences: tuple[Evidence, ...]
     posterior: Posterior
-    change: Callable[[NDArray], NDArray]
+    change: Remedy
     training: gap.Energy
     tested: gap.Energy | None
 
@@ -96,9 +95,16 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     others = [reconstruct(r, baseline.parameters) for r in held_out]
     untestable = not_testable(flights, candidates)
     evidences, posterior = fit(flights, candidates, untestable, baseline, progress)
-    progress("flying the records freely, before and after")
     verdict, hypotheses = judge(posterior)
-    change = remedy(verdict, posterior)
+    explained, described_by = leading(verdict, posterior), described(posterior)
+    if explained is not None and explained.unknown is not None:
+        described_by = explained
+    unknown = None
+    if described_by is not None:
+        progress("describing what the library lacks")
+        unknown = describe_unknown(flights, candidates, evidences, baseline, posterior.tempering, described_by)
+    change = remedy(explained, unknown)
+    progress("flying the records freely, before and after")
     sigma = float(np.mean([e.sigma_w for e in evidences]))
     training = gap.together([gap.energies(f, change, e.sigma_w, seed + i)
                              for i, (f, e) in enumerate(zip(flights, evidences, strict=True))])
@@ -115,12 +121,12 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         effects=[describe(name, posterior) for name, p in ranked(posterior) if p >= LISTED],
         not_testable=[{"effect": name, "why": why} for name, why in sorted(untestable.items())],
         detection_limits=detection_limits(posterior),
-        unknown=describe_unknown(posterior),
+        unknown=None if unknown is None else unknown.answer(),
         gap={"training": {"before": gap.g(training.before, training.alone),
                           "after": gap.g(training.after, training.alone)},
              "held_out": gap.held_out(tested, seed)},
         next_manoeuvre=_next(flights[0], candidates, posterior, hypotheses, sigma),
-        resimulate=resimulation(verdict, posterior, training, flights, evidences),
+        resimulate=resimulation(change, training, flights, evidences),
         data_problems=[_problem(p) for f in (*flights, *others) for p in f.record.problems if not _slow(p, f.record)],
         provenance=provenance(flights, others, evidences, without, len(reference), seed)
         | {"tempering": posterior.tempering},
@@ -146,25 +152,6 @@ def credible(probabilities: Sequence[float], level: float = 0.95) -> list[int]:
     """Indices of the fewest hypotheses that hold `level` of the probability (they come sorted)."""
     count = int(np.searchsorted(np.cumsum(probabilities), level - 1e-12)) + 1
     return list(range(min(count, len(probabilities))))
-
-
-def values_of(fit: SetFit) -> dict[str, dict[str, float]]:
-    """Fitted parameters of every effect of a set."""
-    return {family.effect.name: {**family.effect.neutral(), family.parameter.name: size}
-            for family, size in zip(fit.families, fit.estimate, strict=True)}
-
-
-def remedy(verdict: str, posterior: Posterior) -> Callable[[NDArray], NDArray]:
-    """What the diagnosis changes in the model: its most probable set of effects where it explains, else nothing."""
-    if verdict != "explained":
-        return lambda parameters: parameters
-    values = values_of(explanation(posterior))
-    return lambda parameters: effects.with_effects(parameters, values)
-
-
-def explanation(posterior: Posterior) -> SetFit:
-    """The most probable set of effects that is not empty."""
-    return next(h.fit for h in posterior.hypotheses if h.effects)
 
 
 def describe(name: str, posterior: Posterior) -> dict[str, Any]:
@@ -196,25 +183,6 @@ def _next(flight: Reconstruction, candidates: Bank, posterior: Posterior, hypoth
     rivals = {n: values_of(posterior.leading(n))[n] for n in names}
     likely = posterior.effects
     return next_manoeuvre(flight, candidates, rivals, {n: max(likely[n], 1e-3) for n in names}, sigma)
-
-
-def resimulation(verdict: str, posterior: Posterior, training: gap.Energy, flights: Sequence[Reconstruction],
-                 evidences: Sequence[Evidence]) -> dict[str, Any]:
-    """What to fly to see the diagnosis for oneself."""
-    command, covariance = "icing fly clear_air", None
-    if verdict == "explained":
-        fit = explanation(posterior)
-        for name, values in values_of(fit).items():
-            command += f" --effect {name}:" + ",".join(f"{k}={v:.6g}" for k, v in values.items())
-        covariance = None if fit.covariance is None else fit.covariance.tolist()
-    starts, at = [], 0
-    for flight in flights:
-        starts.append(training.starts[at])
-        at += len(cut(flight).first)
-    records = [{"initial_state": dict(zip(FREE, (float(v) for v in start), strict=True)),
-                "wind": {"sigma_w": evidence.sigma_w}, "biases": {}}
-               for start, evidence in zip(starts, evidences, strict=True)]
-    return {"command": command, "records": records, "parameter_covariance": covariance}
 
 
 def _slow(problem: DataProblem, record: FlightRecord) -> bool:

@@ -1,4 +1,4 @@
-"""Where a gap lies: by component, by flight regime, and in what terms when nothing in the library explains it."""
+"""Where a gap lies: by component and by flight regime."""
 
 from __future__ import annotations
 
@@ -8,14 +8,11 @@ from typing import Any
 import numpy as np
 
 from sim2real.attribution import Posterior
-from sim2real.candidates import DEVIATION, GENERIC, GENERIC_SIZE
-from sim2real.channels import TOLERANCE
 from sim2real.evidence import Evidence
 
 REGIME_VARIABLES = ("alpha", "airspeed", "beta", "q", "p")
 BINS = 4
 SHOWN = 4.0  # standard deviations of the mean whitened energy of a bin above one
-TARGETS = {component: target for component, target, _ in GENERIC}
 
 
 def components(posterior: Posterior, enters_at: Mapping[str, Sequence[str]]) -> dict[str, float]:
@@ -54,31 +51,3 @@ def regimes(evidences: Sequence[Evidence]) -> list[dict[str, Any]]:
             if excess > SHOWN * np.sqrt(2.0 / len(inside)):
                 out.append({"variable": name, "low": float(low), "high": float(high), "excess": excess})
     return sorted(out, key=lambda r: -r["excess"])
-
-
-def describe_unknown(posterior: Posterior) -> dict[str, Any] | None:
-    """Component, terms and kind of what the library lacks; None where that is improbable."""
-    fit = next((h.unknown for h in posterior.hypotheses if h.unknown is not None), None)
-    if posterior.unknown < 0.05 or fit is None:
-        return None
-    target = TARGETS[fit.component]
-    terms: list[dict[str, Any]] = []
-    for name, value, error in fit.terms:
-        size = _size(name, target, fit.component.startswith("sensor:"))
-        terms.append({"term": name, "coefficient": value * size, "std_error": error * size, "z": abs(value / error)})
-    terms.sort(key=lambda t: -t["z"])
-    leading = terms[0]["term"]
-    kind = "time_varying" if leading == "time" else "dynamic" if leading.endswith("_dot") else "static"
-    kept = [t for t in terms if t["z"] > 2.0] or terms[:1]
-    return {"component": fit.component, "kind": kind,
-            "terms": [{k: t[k] for k in ("term", "coefficient", "std_error")} for t in kept]}
-
-
-def _size(name: str, target: str, sensor: bool) -> float:
-    """A term's coefficient in the record's units: coefficient of force or moment per regressor, or of the channel."""
-    if sensor:
-        return TOLERANCE[target] if name in ("1", "time") else 0.1
-    size = GENERIC_SIZE[target]
-    for factor in name.split("*"):
-        size /= DEVIATION.get(factor, 1.0)
-    return size

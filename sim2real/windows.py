@@ -65,6 +65,7 @@ def fly(flight: Reconstruction, parameters: NDArray, first: NDArray[np.intp], st
     values = {name: start[:, j] for j, name in enumerate(FREE)}
     values |= {name: series[first] for name, series in flight.controls.items()}
     put(flown.fleet, values | {"altitude": flight.altitude[first]})
+    flown.fleet.state["step"] = first  # what grows with time has grown by then
     if gusts is not None:
         flown.fleet.state["seed"] = np.arange(len(first), dtype=np.uint64) + np.uint64(gusts[1])
         flown.fleet.start()

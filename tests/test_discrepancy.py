@@ -1,0 +1,193 @@
+"""The effect `discrepancy`: what a diagnosis describes but cannot name, flown by the plant."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from plant import fleet_at, level, loads
+
+from icing_env import scenario
+from icing_env.aircraft import changed, load
+from icing_env.effects import DESCRIPTIONS, LIBRARY, get, parse, with_effects
+from icing_env.effects.discrepancy import AT, CHANNELS, TERMS
+from icing_env.errors import InputError
+from icing_env.simulate import Fleet
+from icing_env.trim import trim
+from sim2real import gap
+from sim2real.candidates import bank, pushes
+from sim2real.diagnosis import diagnose
+from sim2real.discrepancy import choices, condition
+from sim2real.evidence import predicted
+from sim2real.kalman import gains
+from sim2real.predictor import innovations
+from sim2real.reconstruct import reconstruct
+from sim2real.remedy import Remedy
+from testbed.flight import fly
+
+AIRCRAFT = changed(load(), Cm_elevator_CT=0.0)  # power would change what a term of the elevator does
+EFFECT = DESCRIPTIONS["discrepancy"]
+LOAD = {"CX": ("fx", "wing_area"), "CY": ("fy", "wing_area"), "CZ": ("fz", "wing_area"), "Cl": ("roll", "span"),
+        "Cm": ("pitch", "chord"), "Cn": ("yaw", "span")}  # fmt: skip
+AT_VALUES = {"at_alpha": 0.04, "at_elevator": -0.02, "at_airspeed": 62.0, "at_time": 0.0}
+STATE = {"q": 0.03, "p": 0.1, "r": -0.05, "elevator": 0.05, "aileron": 0.03, "rudder": -0.04}
+
+
+def described(**values: float):
+    return with_effects(AIRCRAFT, {"discrepancy": values})
+
+
+def coefficient(name: str, row) -> float:
+    """The coefficient of one state, from the loads."""
+    found = loads(level(1, 70.0, 0.09, 0.03, **STATE), row)
+    qs = 0.5 * found["density"][0] * found["airspeed"][0] ** 2 * row["wing_area"][0]
+    field, length = LOAD[name]
+    return float(found[field][0] / qs / (1.0 if length == "wing_area" else row[length][0]))
+
+
+def factor(term: str) -> float:
+    """What a term multiplies in the state of `coefficient`, from its definition."""
+    p = AIRCRAFT[0]
+    values = {"0": 1.0, "alpha": 0.09 - 0.04, "beta": 0.03, "elevator": 0.05 + 0.02, "airspeed": 70.0 - 62.0,
+              "aileron": 0.03, "rudder": -0.04, "q": 0.03 * p["chord"] / 140.0, "p": 0.1 * p["span"] / 140.0,
+              "r": -0.05 * p["span"] / 140.0, "time": 0.0}  # fmt: skip
+    return float(np.prod([values[part] for part in term.split("_")]))
+
+
+@pytest.mark.parametrize(("name", "term"), [(c, t) for c, terms in TERMS.items() for t in terms])
+def test_a_term_adds_its_product_to_its_coefficient(name, term):
+    size = 0.02
+    changed_by = coefficient(name, described(**{f"{name}_{term}": size}, **AT_VALUES)) - coefficient(name, AIRCRAFT)
+    assert changed_by == pytest.approx(size * factor(term), rel=1e-6, abs=1e-9)
+
+
+def test_neutral_changes_no_bit_and_it_is_no_explanation():
+    assert with_effects(AIRCRAFT, {"discrepancy": EFFECT.neutral()}).tobytes() == AIRCRAFT.tobytes()
+    assert "discrepancy" not in LIBRARY
+    assert get("discrepancy") is EFFECT
+    assert parse("discrepancy:Cm_alpha_alpha=0.3,at_alpha=0.05")[1] == {"Cm_alpha_alpha": 0.3, "at_alpha": 0.05}
+    with pytest.raises(InputError, match="discrepancy"):
+        get("discrepency")
+    with pytest.raises(InputError, match="Cm_alpha_alpha"):
+        described(Cm_alpha_alfa=0.3)
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_growth_counts_from_the_start_and_acts_like_a_constant_of_the_moment(name):
+    """After t seconds the moment is that of an aircraft with the constant that has grown by then."""
+    t = trim(AIRCRAFT, airspeed=65.0)
+    for step in (0, 500):
+        grown, constant = (fleet_at(t, row) for row in (described(**{f"{name}_time": 1e-4}),
+                                                        described(**{f"{name}_0": 1e-4 * step * 0.02})))  # fmt: skip
+        for fleet in (grown, constant):
+            fleet.state["step"] = step
+            fleet.step()
+        for field in ("u", "v", "w", "p", "q", "r"):
+            assert grown.state[field][0] == pytest.approx(constant.state[field][0], rel=1e-9, abs=1e-12)
+
+
+def flown(row, seconds: float = 8.0) -> tuple[Fleet, list]:
+    """A noiseless flight with doublets: the fleet and every sample of its instruments."""
+    quiet = changed(row, **{n: 0.0 for n in row.dtype.names if n.startswith("noise_")})
+    t = trim(AIRCRAFT, airspeed=65.0)
+    fleet, samples = fleet_at(t, quiet), []
+    for step in range(round(seconds / fleet.dt)):
+        sign = 1.0 if step * fleet.dt % 4.0 < 2.0 else -1.0
+        fleet.command["elevator"], fleet.command["rudder"] = t.elevator + 0.03 * sign, 0.03 * sign
+        fleet.step()
+        samples.append(fleet.measurement[0].copy())
+    return fleet, samples
+
+
+@pytest.fixture(scope="module")
+def plain() -> list:
+    return flown(AIRCRAFT)[1]
+
+
+@pytest.mark.parametrize("channel", CHANNELS)
+def test_errors_of_a_channel_are_what_they_say(channel, plain):
+    """Scale about the condition, bias and growth; nothing else is touched."""
+    at = {f"at_{channel}": 0.5} if channel in AT else {}
+    row = described(**{f"bias_{channel}": 0.01, f"scale_{channel}": 0.1, f"drift_{channel}": 0.002}, **at)
+    for before, after in zip(plain, flown(row)[1], strict=True):
+        if channel == "altitude" and round(after["time"] / 0.02) % 5 != 0:
+            continue  # sampled ten times a second
+        wanted = before[channel] + 0.01 + 0.1 * (before[channel] - at.get(f"at_{channel}", 0.0)) + 0.002 * after["time"]
+        assert after[channel] == pytest.approx(wanted, abs=1e-9)
+        assert after["az"] == before["az"] or channel == "az"
+
+
+@pytest.mark.parametrize("channel", ["alpha", "beta", "p", "q", "r", "phi", "theta"])
+@pytest.mark.parametrize("delay", [0.04, -0.04])
+def test_a_delay_shows_what_was_there_before(channel, delay, plain):
+    """The delayed reading is the plain one of two samples ago (or to come), to second order in the delay."""
+    late = np.array([s[channel] for s in flown(described(**{f"delay_{channel}": delay}))[1]])
+    there = np.array([s[channel] for s in plain])
+    steps = round(delay / 0.02)
+    inside = slice(10, -10)
+    moved = np.roll(there, steps)[inside]
+    left, without = late[inside] - moved, there[inside] - moved
+    assert np.sqrt(np.mean(left**2)) < 0.35 * np.sqrt(np.mean(without**2))
+
+
+# ---- what a diagnosis cannot name, described, flown
+
+
+def record(values: dict, seed: int):
+    chosen = scenario.load("clear_air", duration=52.0, parameters={"turbulence_sigma_w": 0.5},
+                           effects={"discrepancy": values})  # fmt: skip
+    return fly(chosen, seed=seed, observer=False, protection=False).record
+
+
+BENT = {"Cm_alpha_elevator": 8.0, "Cm_alpha_alpha": 3.0, "at_alpha": 0.08}  # pitching moment, as no effect has it
+
+
+@pytest.fixture(scope="module")
+def unknown():
+    return diagnose([record(BENT, 3)], [record(BENT, 13)])
+
+
+def test_an_unknown_is_described_by_the_terms_it_has(unknown):
+    assert unknown.verdict == "unknown"
+    assert unknown.unknown["component"] == "pitching_moment"
+    assert unknown.unknown["kind"] == "static"
+    found = {t["term"]: t for t in unknown.unknown["terms"]}
+    for term, size in (("alpha*elevator", 8.0), ("alpha*alpha", 3.0)):
+        assert abs(found[term]["coefficient"] - size) < 3.0 * found[term]["std_error"] < size
+    assert "time" not in found and "airspeed" not in found  # what is not there does not earn a place
+
+
+def test_an_unknown_closes_the_gap_as_knowing_it_does(unknown):
+    held, flight = unknown.gap["held_out"], unknown.details.held_out[0]
+    sigma = unknown.details.evidences[0].sigma_w
+    known = gap.held_out(gap.energies(flight, Remedy({"discrepancy": BENT}), sigma, 1), 0)
+    assert held["closure"] > 0.95 * known["closure"] > 0.7
+    assert held["closure_low95"] <= held["closure"] <= held["closure_high95"]
+
+
+def test_the_command_flies_the_aircraft_that_was_diagnosed(unknown):
+    name, values = parse(unknown.resimulate["command"].split("--effect ")[1])
+    assert name == "discrepancy"
+    assert values == pytest.approx(unknown.details.change.values["discrepancy"], rel=1e-5)
+    assert len(unknown.resimulate["parameter_covariance"]) == len(unknown.unknown["terms"])
+
+
+# Delays are left out: what the search differences are one-step predictions, whose steps are those of the filter too.
+PUSHED = [t for t in bank().terms if t.component != "sensor:altitude" and t.name not in ("airspeed", "time")
+          and not t.name.endswith("_dot")]  # fmt: skip
+
+
+def test_the_generic_terms_of_the_search_are_those_that_are_flown():
+    """A push of the predictor and its number of the effect make the same innovations, to the predictor's step."""
+    flight = reconstruct(record({}, 5).slice(0.0, 24.0))
+    gain, base = gains(flight, (0.5,))[0].with_start(), flight.parameters
+    told = predicted(flight, innovations(flight, base, gain.K)[:, 0].astype(float))
+    pushed = {q.row: q for q in pushes(replace(flight, measured=told), bank())}
+    for term in PUSHED:
+        options = {c.term: c for c in choices(term.component, [flight])}
+        chosen, at = options[term.name], condition(term.component, [flight])
+        row = with_effects(base, {"discrepancy": {chosen.number: 0.5 * chosen.size} | at})
+        push = replace(pushed[term.row], row=1, series=0.5 * pushed[term.row].series)
+        left = innovations(flight, np.concatenate([base, base, row]), gain.K, (push,))[200:].astype(float)
+        search, flown_so = (np.nan_to_num(left[:, j] - left[:, 0]) / np.maximum(flight.noise, 1e-6) for j in (1, 2))
+        cosine = np.sum(search * flown_so) / np.sqrt(np.sum(search**2) * np.sum(flown_so**2))
+        assert cosine > 0.97, (term.component, term.name, cosine)
