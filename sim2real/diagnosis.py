@@ -91,8 +91,8 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     if reference:
         progress("fitting the model to the reference flights")
         baseline = fit_baseline([reconstruct(r) for r in reference], candidates)
-    flights = [reconstruct(r, baseline.parameters) for r in records]
-    others = [reconstruct(r, baseline.parameters) for r in held_out]
+    flights = [reconstruct(r, baseline.near(r)) for r in records]
+    others = [reconstruct(r, baseline.near(r)) for r in held_out]
     untestable = not_testable(flights, candidates)
     evidences, posterior = fit(flights, candidates, untestable, baseline, progress)
     verdict, hypotheses = judge(posterior)

@@ -1,40 +1,151 @@
-"""Flights of the same aircraft without the gap: they correct the model, and say how well it is known then."""
+"""Flights of the same aircraft without the gap: they correct the model, and say how well it is known then.
+
+The model's numbers are fitted by Gauss-Newton, all flown anew at every step, each with a value and a change with the
+flight condition: an aircraft whose derivatives bend with angle of attack is met by lines through its test points. Their
+prior is that of the published model; where the flights contradict it a number's prior widens until they do not
+(automatic relevance: MacKay, Neural Computation 4(3), 1992), so that an aircraft far from the model is followed.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from icing_env import aircraft
-from icing_env.record import FloatArray
-from sim2real.candidates import NUISANCE_STEP, Bank, shifted
-from sim2real.evidence import gather
+from icing_env.record import FlightRecord, FloatArray
+from sim2real.candidates import NUISANCE_STEP, Bank, Nuisance
+from sim2real.evidence import Evidence, gather
+from sim2real.kalman import Gain
 from sim2real.reconstruct import Reconstruction
+
+ROUNDS, SETTLED = 10, 2.0  # flown steps, and the whitened length of one that ends them
+AGAIN = 2  # the round after which gust intensities are chosen anew
+LONGEST = 40.0  # standard deviations that a step may move a number
+REFERENCE_SPEED = 65.0  # m/s, where a number has its value; it changes with (65/V)^2, as alpha does in level flight
+CHANGES = 1.0  # prior standard deviation of that change at twice the dynamic pressure, in that of the value (assumed)
+# What the published spread leaves alone and another aircraft may have: standard deviations (assumed)
+BEYOND: dict[str, float] = {
+    "CY_0": 1e-3, "Cl_0": 3e-4, "Cn_0": 3e-4, "Cl_alpha": 2e-3, "Cm_CT": 0.02, "CZ_CT": 0.02, "Cm_elevator_CT": 0.06,
+    "Cm_alphadot": 0.4, "engine_arm_z": 0.02, "thrust_factor_left+thrust_factor_right": 0.02}  # fmt: skip
+FIXED = ("mass", "thrust")  # a matter of each record
+LEAST = 1e-3  # of a published step: a number near zero has a nuisance that hardly moves it
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """The model a gap is looked for against: its PARAMETERS row and the precision of its nuisances [n, n]."""
+    """The model a gap is looked for against: its PARAMETERS row and the precision of its nuisances [n, n].
+
+    `changes`: what is added to PARAMETERS per unit of (65 m/s / V)^2 - 1, by name.
+    """
 
     parameters: NDArray
     precision: FloatArray
+    changes: dict[str, float] = field(default_factory=dict)
+
+    def near(self, record: FlightRecord) -> NDArray:
+        """PARAMETERS row at the record's median airspeed."""
+        out = self.parameters.copy()
+        if self.changes:
+            condition = _condition(float(np.nanmedian(record["airspeed"])))
+            for name, slope in self.changes.items():
+                out[name] += condition * slope
+        return out
+
+
+def _condition(airspeed: float) -> float:
+    return (REFERENCE_SPEED / airspeed) ** 2 - 1.0
+
+
+def _first(nuisance: Nuisance) -> str:
+    return nuisance.parameter.split("+")[0]
+
+
+def directions(candidates: Bank) -> tuple[Nuisance, ...]:
+    """What is fitted: the candidates' nuisances in steps of the published numbers' size, then those of BEYOND."""
+    row = aircraft.load()[0]
+    out = []
+    for nuisance in candidates.nuisances:
+        size = nuisance.factor * (1.0 if nuisance.absolute else abs(float(row[_first(nuisance)])))
+        out.append(replace(nuisance, factor=size, absolute=True, only="nowhere" if nuisance.name in FIXED else ""))
+    return (*out, *(Nuisance(name, name, size, True) for name, size in BEYOND.items()))
 
 
 def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank) -> Baseline:
-    """Nuisances estimated on reference flights (Gauss-Newton's first step from the published model).
+    """The model corrected by reference flights, and the precision with which they leave it."""
+    moves = directions(candidates)
+    fitted = replace(candidates, nuisances=moves, families=(), terms=(), size=1 + len(moves))
+    at = np.array([_condition(float(np.median(f.channel("airspeed")))) for f in flights])
+    x, gains, n = np.zeros(2 * len(moves)), None, len(moves)
+    spread = np.concatenate([np.ones(n), np.full(n, CHANGES)])
+    for k in range(ROUNDS):
+        evidences = _gather(flights, fitted, x, at, gains)
+        gains = None if k == AGAIN else [e.gain for e in evidences]
+        information, slope, tempering = _normal(evidences, at)
+        prior = np.diag(1.0 / np.maximum(spread, np.abs(x)) ** 2)
+        precision = information / tempering + prior
+        step = -np.linalg.solve(precision, slope / tempering + prior @ x)
+        x = x + step * min(1.0, LONGEST / max(float(np.max(np.abs(step))), LONGEST))
+        if k > AGAIN + 1 and float(step @ precision @ step) < SETTLED**2:
+            break
+    return _baseline(candidates, moves, x, precision, float(np.mean(at)))
 
-    Their prior N(0, 1) and the records' information give mean -(I + G'G)^-1 G'v and precision I + G'G.
-    """
-    only = replace(candidates, families=(), terms=(), size=1 + len(candidates.nuisances))
-    gram = np.sum([gather(flight, only).gram for flight in flights], axis=0)
-    n = len(candidates.nuisances)
-    precision = np.eye(n) + gram[1 : n + 1, 1 : n + 1] / NUISANCE_STEP**2
-    mean = -np.linalg.solve(precision, gram[1 : n + 1, 0] / NUISANCE_STEP)
+
+def _gather(flights: Sequence[Reconstruction], fitted: Bank, x: FloatArray, at: FloatArray,
+            gains: Sequence[Gain] | None) -> list[Evidence]:
+    n = len(fitted.nuisances)
+    out = []
+    for i, flight in enumerate(flights):
+        row = flight.parameters.copy()
+        for nuisance, size in zip(fitted.nuisances, x[:n] + at[i] * x[n:], strict=True):
+            nuisance.apply(row, 0, flight.power_from, float(size))
+        out.append(gather(replace(flight, parameters=_possible(row)), fitted, None if gains is None else gains[i]))
+    return out
+
+
+def _possible(row: NDArray) -> NDArray:
+    """No negative lags."""
+    for name in ("elevator_lag", "aileron_lag", "rudder_lag", "vane_lag"):
+        row[name] = np.maximum(row[name], 1e-3)
+    return row
+
+
+def _normal(evidences: Sequence[Evidence], at: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Information and slope of values and changes together [2 n], and what to divide them by (see weigh.temper)."""
+    from sim2real.weigh import temper  # which needs this module for Baseline
+
+    n = len(evidences[0].gram) - 1
+    information, slope, misfit = np.zeros((2 * n, 2 * n)), np.zeros(2 * n), 0.0
+    for evidence, condition in zip(evidences, at, strict=True):
+        both = np.vstack([np.eye(n), condition * np.eye(n)]) / NUISANCE_STEP
+        information += both @ evidence.gram[1:, 1:] @ both.T
+        slope += both @ evidence.gram[1:, 0]
+        misfit += evidence.gram[0, 0]
+    gain = float(slope @ np.linalg.lstsq(information, slope, rcond=1e-9)[0])
+    return information, slope, temper(max(misfit - gain, 0.0), evidences)
+
+
+def _baseline(candidates: Bank, moves: Sequence[Nuisance], x: FloatArray, precision: FloatArray,
+              middle: float) -> Baseline:
+    """The fitted model; its nuisances' precision in their own units, the rest integrated out."""
+    n, count = len(moves), len(candidates.nuisances)
+    row, changes = aircraft.load(), {}
+    for nuisance, size, change in zip(moves, x[:n], x[n:], strict=True):
+        if not nuisance.only:
+            nuisance.apply(row, 0, "", float(size))
+            changes |= {name: float(change) * nuisance.factor for name in nuisance.parameter.split("+")}
+    both = np.vstack([np.eye(n), middle * np.eye(n)])
+    covariance = (both.T @ np.linalg.inv(precision) @ both)[:count, :count]
+    unit = np.ones(count)
+    for j, (nuisance, move) in enumerate(zip(candidates.nuisances, moves, strict=False)):
+        if not nuisance.absolute:
+            now = abs(float(row[_first(nuisance)][0])) * nuisance.factor
+            unit[j] = max(now / move.factor, LEAST)
+    out = unit[:, None] * np.linalg.inv(covariance) * unit
     for j, nuisance in enumerate(candidates.nuisances):
-        if nuisance.name in ("mass", "thrust"):  # a matter of each record
-            mean[j], precision[j], precision[:, j] = 0.0, 0.0, 0.0
-            precision[j, j] = 1.0
-    return Baseline(shifted(aircraft.load(), candidates.nuisances, mean, ""), precision)
+        if nuisance.name in FIXED:
+            out[j], out[:, j] = 0.0, 0.0
+            out[j, j] = 1.0
+    return Baseline(_possible(row), 0.5 * (out + out.T), changes)

@@ -19,7 +19,8 @@ NAMES = ("speed", "characterisation", "protection", "adaptation", "diagnosis", "
 EXAMPLE = """icing benchmark speed --json
 icing benchmark characterisation --quick --figure out/reliability.png
 icing benchmark protection --encounters 200 --json
-icing benchmark diagnosis --quick --out out/withheld"""
+icing benchmark diagnosis --quick --out out/withheld
+icing benchmark diagnosis --jsbsim"""
 
 
 @verb("benchmark", EXAMPLE)
@@ -33,13 +34,15 @@ icing benchmark diagnosis --quick --out out/withheld"""
 @click.option("--fresh-seed", is_flag=True, help="diagnosis: a sealed set, its seed from the operating system.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/withheld"),
               show_default=True, help="diagnosis: records, keys, answers; an interrupted run goes on from there.")
+@click.option("--jsbsim", is_flag=True, help="diagnosis: JSBSim's DHC-6 as the aircraft; 16 cases if not told.")
+@click.option("--jsbsim-root", type=click.Path(file_okay=False), help="diagnosis: a JSBSim tree; else JSBSIM_ROOT.")
 @click.option("--ledger", type=click.Path(path_type=Path, dir_okay=False),
               help="diagnosis: append a line on this run to that file.")
 @click.option("--without", is_flag=True, help="diagnosis: also each effect in turn left out of the library.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="diagnosis: processes.")
 def command(name: str, quick: bool, weights: Path | None, figure: Path | None, encounters: int | None,
             only: str | None, cases: int | None, fresh_seed: bool, out: Path, ledger: Path | None, workers: int,
-            without: bool, as_json: bool, seed: int) -> None:
+            without: bool, jsbsim: bool, jsbsim_root: str | None, as_json: bool, seed: int) -> None:
     """Measure the testbed.
 
     `speed`: one aircraft and batches, with and without observer, one thread, beside JSBSim in the same run (if it is
@@ -59,6 +62,9 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
         return
     if name == "adaptation":
         _adaptation(quick, as_json)
+        return
+    if name == "diagnosis" and (jsbsim or jsbsim_root):
+        _jsbsim(cases, seed, out / "jsbsim", workers, jsbsim_root, as_json)
         return
     if name == "diagnosis":
         _diagnosis(quick, cases, None if fresh_seed else seed, out, ledger, workers, without, as_json)
@@ -113,6 +119,17 @@ def _diagnosis(quick: bool, cases: int | None, seed: int | None, out: Path, ledg
                     without)
     if ledger is not None:
         enter_ledger(ledger, found, out)
+    if as_json:
+        print_json(found)
+        return
+    for title, headers, rows in tables(found):
+        print_table(title, headers, rows)
+
+
+def _jsbsim(cases: int | None, seed: int, out: Path, workers: int, root: str | None, as_json: bool) -> None:
+    from testbed.jsbsim_benchmark import measure, tables
+
+    found = measure(out, cases, seed, workers, root, lambda what: click.echo(what, err=True))
     if as_json:
         print_json(found)
         return
