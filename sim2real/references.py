@@ -131,7 +131,7 @@ def _baseline(candidates: Bank, moves: Sequence[Nuisance], x: FloatArray, precis
               middle: float) -> Baseline:
     """The fitted model; its nuisances' precision in their own units, the rest integrated out."""
     n, count = len(moves), len(candidates.nuisances)
-    row, changes = aircraft.load(), {}
+    row, changes = aircraft.load(), dict[str, float]()
     for nuisance, size, change in zip(moves, x[:n], x[n:], strict=True):
         if not nuisance.only:
             nuisance.apply(row, 0, "", float(size))

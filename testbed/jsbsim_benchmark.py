@@ -89,12 +89,10 @@ def solve(case: Path) -> dict[str, Any]:
     from testbed.commands.common import plain
     from testbed.commands.diagnose import answer
 
-    by_role: dict[str, list[Any]] = {"diagnose": [], "held_out": [], "reference": []}
-    for path in sorted(case.glob("*.csv")):
-        record = read(path)
-        by_role[record.meta.role].append(record)
     try:
-        found: dict[str, Any] = plain(answer(diagnose(*by_role.values())))
+        records = [read(path) for path in sorted(case.glob("*.csv"))]
+        of = {role: [r for r in records if r.meta.role == role] for role in ("diagnose", "held_out", "reference")}
+        found: dict[str, Any] = plain(answer(diagnose(of["diagnose"], of["held_out"], of["reference"])))
     except InputError as error:
         return {"error": str(error)}
     return found
