@@ -21,7 +21,7 @@ from sim2real.evidence import Evidence, gather
 from sim2real.kalman import Gain
 from sim2real.reconstruct import Reconstruction
 
-ROUNDS, SETTLED = 10, 2.0  # flown steps, and the whitened length of one that ends them
+ROUNDS, SETTLED = 10, 4.0  # flown steps, and the whitened length of one that ends them
 AGAIN = 2  # the round after which gust intensities are chosen anew
 LONGEST = 40.0  # standard deviations that a step may move a number
 REFERENCE_SPEED = 65.0  # m/s, where a number has its value; it changes with (65/V)^2, as alpha does in level flight

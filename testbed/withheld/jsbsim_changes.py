@@ -62,7 +62,7 @@ CHANGES: tuple[Change, ...] = (
     Change("pitch_damping", (_M,), "change", -0.15, _factor("Cmq")),
     Change("rudder_power", (_N,), "change", -0.1, _factor("Cndr")),
     Change("dihedral_effect", (_L,), "change", 0.25, _factor("Clb")),
-    Change("lateral_cg", ("mass",), "right", 0.1, lambda s: (loaded(right=s),)),
+    Change("lateral_cg", ("mass", _L), "right", 0.1, lambda s: (loaded(right=s),)),
     Change("inertia_error", ("mass",), "xx", 0.15, lambda s: (loaded(inertia_xx=1.0 + s),)),
     Change("alpha_scale", ("sensor:alpha",), "change", 0.1, wrong=lambda s: {"scale_alpha": s}),
     Change("pitch_gyro_bias", ("sensor:q",), "offset", 0.005, wrong=lambda s: {"bias_q": s}),
