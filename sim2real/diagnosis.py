@@ -19,6 +19,7 @@ from sim2real.attribution import P_NONE, P_UNKNOWN, Posterior
 from sim2real.candidates import SPREAD, Bank, bank, not_testable
 from sim2real.discrepancy import describe_unknown, described
 from sim2real.evidence import Evidence
+from sim2real.ladder import ladder
 from sim2real.manoeuvre import next_manoeuvre
 from sim2real.reconstruct import Reconstruction, reconstruct
 from sim2real.references import Baseline, fit_baseline
@@ -65,7 +66,7 @@ class Details:
 
 def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] = (),
              reference: Sequence[FlightRecord] = (), without: Iterable[str] = (), seed: int = 0,
-             progress: Progress = lambda text: None) -> Diagnosis:
+             progress: Progress = lambda text: None, climb: bool = False) -> Diagnosis:
     """Diagnose the gap between the model and the aircraft that flew `records`.
 
     Args:
@@ -75,6 +76,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         without: effects to leave out of the library.
         seed: of the synthetic records behind the gap without a gap.
         progress: told what is being done.
+        climb: measure the evidence ladder on the held-out records too (as long again as the diagnosis).
 
     Raises:
         InputError: no records, an unknown effect in `without`, or a record that cannot be used.
@@ -106,10 +108,12 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     change = remedy(explained, unknown)
     progress("flying the records freely, before and after")
     sigma = float(np.mean([e.sigma_w for e in evidences]))
-    training = gap.together([gap.energies(f, change, e.sigma_w, seed + i)
+    training = gap.together([gap.energies(f, change, e.sigma_w, seed + i, change.paths)
                              for i, (f, e) in enumerate(zip(flights, evidences, strict=True))])
-    tested = gap.together([gap.energies(f, change, sigma, seed + 1000 + i) for i, f in enumerate(others)]
+    tested = gap.together([gap.energies(f, change, sigma, seed + 1000 + i, change.paths) for i, f in enumerate(others)]
                           ) if others else None
+    rungs = {"ladder": ladder(flights, others, candidates, baseline, evidences, posterior, explained, change, tested,
+                              seed, progress)} if climb and tested is not None else {}  # fmt: skip
     enters_at = {name: effect.enters_at for name, effect in effects.LIBRARY.items()}
     progress("looking for what to fly next")
     return Diagnosis(
@@ -124,7 +128,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         unknown=None if unknown is None else unknown.answer(),
         gap={"training": {"before": gap.g(training.before, training.alone),
                           "after": gap.g(training.after, training.alone)},
-             "held_out": gap.held_out(tested, seed)},
+             "held_out": gap.held_out(tested, seed)} | rungs,
         next_manoeuvre=_next(flights[0], candidates, posterior, hypotheses, sigma),
         resimulate=resimulation(change, training, flights, evidences),
         data_problems=[_problem(p) for f in (*flights, *others) for p in f.record.problems if not _slow(p, f.record)],

@@ -7,20 +7,22 @@ records through the same windows); g = sqrt(mean over channels of max(e_c^2 - f_
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from icing_env.record import FloatArray
+from sim2real.paths import driven
 from sim2real.reconstruct import Reconstruction
-from sim2real.windows import COMPARED, cut, null_residuals, residuals
+from sim2real.windows import COMPARED, Push, cut, null_residuals, residuals
 
 REPEATS = 20  # synthetic records behind f_c and behind the gap that no gap shows
 RESAMPLES = 400
 
 Change = Callable[[NDArray], NDArray]
+Paths = Collection[str]  # surfaces whose actuators are flown too, from the recorded commands
 
 
 @dataclass(frozen=True)
@@ -36,16 +38,35 @@ class Energy:
     starts: FloatArray
 
 
-def energies(flight: Reconstruction, change: Change, sigma: float, seed: int) -> Energy:
-    """Residual energy of one record under the model and under the model changed by the diagnosis."""
-    windows = cut(flight)
-    base = flight.parameters
-    left, start = residuals(flight, base, windows)
-    changed = change(base)
-    same = changed.tobytes() == base.tobytes()
-    after = left if same else residuals(flight, changed, windows)[0]
-    alone = null_residuals(flight, base, windows, start, sigma, REPEATS, seed)
-    return Energy(_mean_square(left), _mean_square(after), _mean_square(alone), start)
+def energies(flight: Reconstruction, change: Change, sigma: float, seed: int, paths: Paths = ()) -> Energy:
+    """Residual energy of one record under the model and under the model changed by the diagnosis.
+
+    Args:
+        change: what the diagnosis changes in PARAMETERS.
+        sigma, seed: gust intensity (m/s) and seed of the synthetic records behind noise and gusts alone.
+        paths: surfaces that follow the recorded commands through the actuator, before and after alike; the others
+            are where they were recorded.
+    """
+    windows, base = cut(flight), flight.parameters
+    asked = driven(flight, base, paths)
+    left, start = residuals(asked, base, windows)
+    before = _mean_square(left)
+    same = change(base).tobytes() == base.tobytes()
+    after = before if same else squares(flight, change, paths)
+    alone = null_residuals(asked, base, windows, start, sigma, REPEATS, seed)
+    return Energy(before, after, _mean_square(alone), start)
+
+
+def squares(flight: Reconstruction, change: Change, paths: Paths = (),
+            push: Callable[[], Push] | None = None) -> FloatArray:
+    """Mean square residual [windows, channels] of one record under a changed model.
+
+    Args:
+        change, paths: as for `energies`.
+        push: as for `sim2real.windows.fly`.
+    """
+    changed = change(flight.parameters)
+    return _mean_square(residuals(driven(flight, changed, paths), changed, cut(flight), push)[0])
 
 
 def together(parts: list[Energy]) -> Energy:

@@ -7,6 +7,8 @@ and lever to shaft power through the spool lag of `icing_env.propulsion`.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,7 @@ from sim2real.reconstruct import Reconstruction
 POSITION_NOISE = 5.2e-4  # rad, the least believed (0.03 deg)
 POWER_NOISE = 0.01  # of full power
 ACTUATOR = ("lag", "rate", "min", "max", "gearing", "offset")
+UNFILTERED = 1e6  # Hz: no low pass
 STILL_COMMAND, STILL_LEVER = 1e-4, 1e-3  # rad, 0..1: a command that moves less tests nothing
 
 
@@ -84,6 +87,21 @@ def _full_power(altitude: Any, aircraft: Any) -> Any:
     for k in range(len(altitude)):
         out[k] = power_available(pressure(altitude[k]), aircraft[0])
     return out
+
+
+def driven(flight: Reconstruction, parameters: NDArray, paths: Collection[str]) -> Reconstruction:
+    """The record with the surfaces of `paths` where the actuator of one PARAMETERS row takes the recorded command.
+
+    Where the command was not recorded the surface stays where it was recorded.
+    """
+    controls, unrecorded = dict(flight.controls), parameters.copy()
+    unrecorded["filter_frequency"] = UNFILTERED
+    for surface in paths:
+        command = flight.commands.get(f"{surface}_command")
+        if command is not None and np.ptp(command) > STILL_COMMAND:
+            first = float(flight.controls[surface][0])
+            controls[surface] = follow(command, first, unrecorded, surface, flight.dt)[:, 0]
+    return replace(flight, controls=controls)
 
 
 def _engine_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple[FloatArray, list[int]]]:

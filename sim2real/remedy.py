@@ -14,6 +14,7 @@ from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real import gap
 from sim2real.attribution import Hypothesis, Posterior
+from sim2real.channels import SURFACES
 from sim2real.discrepancy import Description
 from sim2real.evidence import Evidence
 from sim2real.reconstruct import Reconstruction
@@ -38,6 +39,12 @@ class Remedy:
     def __call__(self, parameters: NDArray) -> NDArray:
         """PARAMETERS with the values in them."""
         return effects.with_effects(parameters, self.values) if self.values else parameters
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Surfaces whose actuator is part of it."""
+        entered = {component for name in self.values for component in effects.get(name).enters_at}
+        return tuple(surface for surface in SURFACES if f"{surface}_path" in entered)
 
     @property
     def command(self) -> str:

@@ -6,6 +6,7 @@ attitude, with the same freedom for every model, so that no model profits from b
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,10 @@ LENGTH, START = 10.0, 2.0  # s
 FREE = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta")
 COMPARED = MEASURED[:12]
 ITERATIONS = 2
+# What pushes the plant as it flies: told the rows and the sample each stands at, it returns what accelerometers feel of
+# it [rows, 3]. One is made for every flight, since it may remember.
+Push = Callable[[Predictor, NDArray[np.intp]], FloatArray]
+_AX = COMPARED.index("ax")
 _TOLERANCE = np.array([TOLERANCE[c] for c in COMPARED])
 
 
@@ -46,7 +51,7 @@ def measured_windows(flight: Reconstruction, windows: Windows) -> FloatArray:
 
 
 def fly(flight: Reconstruction, parameters: NDArray, first: NDArray[np.intp], start: FloatArray, steps: int,
-        gusts: tuple[float, int] | None = None) -> FloatArray:
+        gusts: tuple[float, int] | None = None, push: Callable[[], Push] | None = None) -> FloatArray:
     """Fly rows freely from sample `first` of each.
 
     Args:
@@ -54,6 +59,7 @@ def fly(flight: Reconstruction, parameters: NDArray, first: NDArray[np.intp], st
         start: [rows, FREE].
         steps: how many samples.
         gusts: intensity (m/s) and seed, to make a synthetic measurement with noise; none if omitted.
+        push: makes what pushes the rows beside their own equations; nothing if omitted.
 
     Returns:
         Readings [rows, steps, channels compared].
@@ -69,15 +75,26 @@ def fly(flight: Reconstruction, parameters: NDArray, first: NDArray[np.intp], st
     if gusts is not None:
         flown.fleet.state["seed"] = np.arange(len(first), dtype=np.uint64) + np.uint64(gusts[1])
         flown.fleet.start()
-    out = np.ascontiguousarray(flown.fly(steps, first).transpose(1, 0, 2)[:, :, : len(COMPARED)])
+    read = flown.fly(steps, first) if push is None else _pushed(flown, first, steps, push())
+    out = np.ascontiguousarray(read.transpose(1, 0, 2)[:, :, : len(COMPARED)])
     if gusts is not None:
         rng = np.random.default_rng(gusts[1])
         out += rng.standard_normal(out.shape) * flight.noise[: len(COMPARED)]
     return out
 
 
+def _pushed(flown: Predictor, first: NDArray[np.intp], steps: int, push: Push) -> FloatArray:
+    """Step by step, pushed before each: readings [steps, rows, channels of MEASURED]."""
+    out = np.empty((steps, flown.n, len(MEASURED)))
+    for k in range(steps):
+        felt = push(flown, first + k)
+        out[k] = flown.fly(1, first + k)[0]
+        out[k, :, _AX : _AX + 3] += felt
+    return out
+
+
 def estimate_start(flight: Reconstruction, parameters: NDArray, first: NDArray[np.intp], measured: FloatArray,
-                   steps: int) -> FloatArray:
+                   steps: int, push: Callable[[], Push] | None = None) -> FloatArray:
     """State at the start of each row [rows, FREE] that best gives the first `steps` samples of `measured`."""
     guess = _guess(flight, measured[:, : max(3, steps // 4)], first)
     rows, size = len(first), np.array([0.5, *np.full(7, 0.005)])
@@ -85,7 +102,8 @@ def estimate_start(flight: Reconstruction, parameters: NDArray, first: NDArray[n
     spread = np.concatenate([np.zeros((1, len(FREE))), np.diag(size)])
     for _ in range(ITERATIONS):
         tried = (guess[:, None, :] + spread).reshape(-1, len(FREE))
-        y = fly(flight, np.repeat(parameters, len(spread)), np.repeat(first, len(spread)), tried, steps)
+        y = fly(flight, np.repeat(parameters, len(spread)), np.repeat(first, len(spread)), tried, steps,
+                push=push)  # fmt: skip
         y = y.reshape(rows, len(spread), steps, -1)
         left = np.nan_to_num((measured[:, :steps] - y[:, 0]) * weight)
         known = np.isfinite(measured[:, :steps])
@@ -107,11 +125,12 @@ def _guess(flight: Reconstruction, early: FloatArray, first: NDArray[np.intp]) -
     return out
 
 
-def residuals(flight: Reconstruction, parameters: NDArray, windows: Windows) -> tuple[FloatArray, FloatArray]:
+def residuals(flight: Reconstruction, parameters: NDArray, windows: Windows,
+              push: Callable[[], Push] | None = None) -> tuple[FloatArray, FloatArray]:
     """Measured less freely simulated, in tolerances [windows, samples, channels], and the starts [windows, FREE]."""
     measured, rows = measured_windows(flight, windows), np.repeat(parameters, len(windows.first))
-    start = estimate_start(flight, rows, windows.first, measured, windows.start)
-    return (measured - fly(flight, rows, windows.first, start, windows.length)) / _TOLERANCE, start
+    start = estimate_start(flight, rows, windows.first, measured, windows.start, push)
+    return (measured - fly(flight, rows, windows.first, start, windows.length, push=push)) / _TOLERANCE, start
 
 
 def null_residuals(flight: Reconstruction, parameters: NDArray, windows: Windows, start: FloatArray, sigma: float,

@@ -14,10 +14,11 @@ from icing_env.record import FloatArray
 from sim2real import gap
 from sim2real.channels import TOLERANCE
 from sim2real.diagnosis import Diagnosis
+from sim2real.paths import driven
 from sim2real.windows import COMPARED, cut, residuals
 from sim2real.words import sentences
 from testbed.commands.common import plain
-from testbed.plot_style import ROLES, styled
+from testbed.plot_style import ROLES, scale_of, styled
 from testbed.plotting import gap_bars, time_histories
 from testbed.report import Report
 
@@ -43,7 +44,7 @@ def build(found: Diagnosis, result: Mapping[str, Any]) -> Report:
         report.text(sentence)
     _explanations(report, result)
     _where(report, found, result)
-    _closing(report, found)
+    _closing(report, found, result)
     _limits(report, result)
     return report
 
@@ -80,29 +81,44 @@ def _where(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:
     report.figure(_heat(training), "Residual by channel and window, in tolerances, before the diagnosis.")
     if result["where"]["regimes"]:
         report.table(["variable", "from", "to", "excess"],
-                     [[r["variable"], r["low"], r["high"], r["excess"]] for r in result["where"]["regimes"][:10]],
+                     [[scale_of(r["variable"]).label, r["low"], r["high"], r["excess"]]
+                      for r in result["where"]["regimes"][:10]],
                      "Regimes in which one-step predictions err by more than noise and gusts (mean square less one).")
 
 
-def _closing(report: Report, found: Diagnosis) -> None:
+def _closing(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:
     report.section("How far the gap closes")
     flights = found.details.held_out or found.details.flights
     what = "held-out" if found.details.held_out else "diagnosed"
     if found.details.tested is not None:
         report.figure(gap_bars(gap.by_channel(found.details.tested.before), gap.by_channel(found.details.tested.after),
                                gap.by_channel(found.details.tested.alone.mean(axis=0))), "The held-out records.")
+    if "ladder" in result["gap"]:
+        _ladder(report, result["gap"]["ladder"])
     flight = flights[0]
     windows = cut(flight)
     series = {"record": {"time": flight.time, **{c: flight.channel(c) for c in COMPARED if flight.has(c)}}}
     index = (windows.first[:, None] + 1 + np.arange(windows.length)).ravel()
-    for label, parameters in (("before", flight.parameters), ("after", found.details.change(flight.parameters))):
-        left = residuals(flight, parameters, windows)[0] * _tolerances()
+    change = found.details.change
+    for label, parameters in (("before", flight.parameters), ("after", change(flight.parameters))):
+        left = residuals(driven(flight, parameters, change.paths), parameters, windows)[0] * _tolerances()
         flown = flight.measured[index, : len(COMPARED)] - left.reshape(-1, len(COMPARED))
         series[label] = {"time": flight.time[index],
                          **{c: flown[:, j] for j, c in enumerate(COMPARED) if flight.has(c) and c in OVERLAID}}
     channels = [c for c in OVERLAID if flight.has(c)]
     report.figure(time_histories(series, channels, {"record": "truth", "before": "iced", "after": "protected"}),
                   f"The first {what} record and its free simulation, restarted every 10 s.")
+
+
+def _ladder(report: Report, ladder: Mapping[str, Any]) -> None:
+    report.figure(_rungs(ladder), "The evidence ladder: the gap left on the held-out records by the model as it is, "
+                  "by the best explanation that shares nothing with the diagnosed one, by the diagnosed one, and by a "
+                  "regression that knows no physics. Whiskers: 95 % intervals over windows. Dashed: what noise and "
+                  "gusts alone stay below 95 times in 100.")
+    none = ladder["no_gap"]
+    report.text(f"On synthetic records without a gap the same search picks {', '.join(none['effects'])} as its best "
+                f"explanation (probability of no gap {none['probability_no_gap']:.2f}) and closes "
+                f"{100.0 * none['closure']:.1f} % of the residual there, noise and gusts included.")
 
 
 def _limits(report: Report, result: Mapping[str, Any]) -> None:
@@ -136,13 +152,38 @@ def _bars(values: Mapping[str, float], label: str) -> Figure:
 
 
 @styled
+def _rungs(ladder: Mapping[str, Any]) -> Figure:
+    """The gap each rung leaves, with the interval that its closure has."""
+    rungs = list(reversed(ladder["rungs"]))
+    figure = Figure(figsize=(9.2, 1.1 + 0.42 * len(rungs)), layout="constrained")
+    axes = figure.subplots()
+    before = next(r["gap"] for r in rungs if r["name"] == "nothing")
+    for y, rung in enumerate(rungs):
+        role = "protected" if rung["name"] == "diagnosed" else "iced" if rung["name"] == "nothing" else "estimate"
+        axes.barh(y, rung["gap"], 0.6, color=ROLES[role]["color"])
+        end = rung["gap"]
+        if rung["closure"] is not None and rung["closure_low95"] is not None and rung["name"] != "nothing":
+            low, end = (max(before * (1.0 - rung[f"closure_{side}95"]), 0.0) for side in ("high", "low"))
+            axes.plot([low, end], [y, y], color=ROLES["truth"]["color"], marker="|", markersize=9)
+            axes.annotate(f"{100.0 * rung['closure']:.0f} % closed", (max(end, rung["gap"]), y), (6, 0),
+                          textcoords="offset points", va="center")  # fmt: skip
+    axes.axvline(ladder["noise95"], **ROLES["limit"])
+    names = {"nothing": "nothing: the model", "black box": "black box: no physics"}
+    axes.set_yticks(range(len(rungs)), [names.get(r["name"], f"{r['name']}: {', '.join(r['effects'])}") for r in rungs])
+    axes.set_xlim(0.0, 1.18 * max(r["gap"] for r in rungs))
+    axes.set_xlabel("gap on the held-out records (tolerances)")
+    axes.grid(False, axis="y")
+    return figure
+
+
+@styled
 def _heat(energy: gap.Energy) -> Figure:
     shown = [j for j in range(len(COMPARED)) if np.isfinite(energy.before[:, j]).any()]
     values = np.sqrt(energy.before[:, shown].T)
     figure = Figure(figsize=(9.2, 1.0 + 0.3 * len(shown)), layout="constrained")
     axes = figure.subplots()
     image = axes.imshow(values, aspect="auto", cmap="viridis", vmin=0.0)
-    axes.set_yticks(range(len(shown)), [COMPARED[j] for j in shown])
+    axes.set_yticks(range(len(shown)), [scale_of(COMPARED[j]).label for j in shown])
     axes.set_xlabel("window (10 s each)")
     axes.grid(False)
     figure.colorbar(image, ax=axes, label="tolerances")

@@ -29,11 +29,13 @@ RECORDS = click.Path(path_type=Path)
 @click.option("--without", multiple=True, metavar="EFFECT", help="Leave an effect out of the library. May be repeated.")
 @click.option("--out", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
               help="Write diagnosis.json and report.html there.")  # fmt: skip
+@click.option("--ladder", is_flag=True,
+              help="Also close the gap by a rival, by a regression without physics, and where there is none.")
 @click.option("--policies", is_flag=True,
               help="Also rank controllers by the simulator before and after, and on the aircraft as diagnosed.")
 @own_effects
 def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tuple[Path, ...],
-            without: tuple[str, ...], out: Path | None, policies: bool, as_json: bool, seed: int) -> None:
+            without: tuple[str, ...], out: Path | None, ladder: bool, policies: bool, as_json: bool, seed: int) -> None:
     """Say where the model and the aircraft that flew RECORD part, and which unmodelled effect causes it.
 
     Records are .csv, .parquet or SIDPAC's .mat. Every effect of `icing effects` is tried, beside "no gap" and "nothing
@@ -45,7 +47,8 @@ def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tu
     from sim2real.diagnosis import diagnose
 
     with Console(stderr=True).status("reading the records") as status:
-        found = diagnose(read_all(records), read_all(held_out), read_all(reference), without, seed, status.update)
+        found = diagnose(read_all(records), read_all(held_out), read_all(reference), without, seed, status.update,
+                         climb=ladder)  # fmt: skip
         result = answer(found)
         if policies:
             result["policies"] = rank_policies(result, seed, status.update)
@@ -126,11 +129,27 @@ def show(found: Diagnosis, result: dict[str, Any]) -> None:
     channels = result["where"]["channels"]
     print_table("Gap by channel, tolerances of 14 CFR Part 60", {"channel": "left", "before": "right"},
                 [[c, f"{v:.2f}"] for c, v in sorted(channels.items(), key=lambda item: -item[1])])
+    if "ladder" in result["gap"]:
+        show_ladder(result["gap"]["ladder"])
     if result["not_testable"]:
         click.echo()
         click.echo("Not testable: " + "; ".join(f"{n['effect']} ({n['why']})" for n in result["not_testable"]))
     for problem in result["data_problems"]:
         click.echo(f"Record: {problem['channel']} {problem['kind']}")
+
+
+def show_ladder(ladder: dict[str, Any]) -> None:
+    """What each rung of the evidence ladder leaves of the gap on the held-out records."""
+    headers = {"rung": "left", "effects": "left", "gap left": "right", "closed": "right", "95 %": "left"}
+    rows = []
+    for rung in ladder["rungs"]:
+        closed, low, high = (None if rung[k] is None else f"{100.0 * rung[k]:.0f} %"
+                             for k in ("closure", "closure_low95", "closure_high95"))  # fmt: skip
+        rows.append([rung["name"], ", ".join(rung["effects"]), f"{rung['gap']:.3f}", closed or "-",
+                     f"{low} .. {high}" if low else ""])
+    click.echo()
+    print_table("Evidence ladder: gap on the held-out records, tolerances", headers, rows)
+    click.echo(f"Where there is no gap the same search closes {100.0 * ladder['no_gap']['closure']:.1f} %.")
 
 
 def _parameter(entry: dict[str, Any]) -> tuple[str, str, str, str]:

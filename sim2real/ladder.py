@@ -1,0 +1,137 @@
+"""The evidence ladder: what is closed of the gap on held-out records by nothing, by rivals, and where there is none.
+
+On the same held-out windows: the model as it is; the best explanation that shares nothing with the diagnosed one; the
+diagnosed one; and a regression that knows no physics, as a ceiling. Then the same search on synthetic records of the
+model itself: the best explanation it finds there, believed or not, "closes" what it closes where there is nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from icing_env.record import FloatArray
+from sim2real import black_box, gap
+from sim2real.attribution import Hypothesis, Posterior
+from sim2real.candidates import Bank, not_testable
+from sim2real.channels import MEASURED
+from sim2real.discrepancy import describe_unknown
+from sim2real.evidence import Evidence
+from sim2real.paths import driven
+from sim2real.reconstruct import Reconstruction
+from sim2real.references import Baseline
+from sim2real.remedy import Remedy, remedy
+from sim2real.weigh import Progress, fit
+from sim2real.windows import COMPARED, FREE, fly
+
+PIECE = 20.0  # s of a synthetic record: flown open loop, gusts carry it off
+Rung = dict[str, Any]
+
+
+def ladder(flights: Sequence[Reconstruction], others: Sequence[Reconstruction], candidates: Bank, baseline: Baseline,
+           evidences: Sequence[Evidence], posterior: Posterior, explained: Hypothesis | None, change: Remedy,
+           tested: gap.Energy, seed: int, progress: Progress = lambda text: None) -> dict[str, Any]:
+    """Every rung on the held-out records.
+
+    Args:
+        flights, others: diagnosed and held-out records.
+        explained, change: the diagnosed explanation and what it changes in the model.
+        tested: residual energies of the held-out records before and after `change`.
+        seed: of synthetic records and intervals.
+
+    Returns:
+        `rungs`: [{"name", "effects", "gap", "closure", "closure_low95", "closure_high95"}], gaps in tolerances;
+        `noise95`: gap that noise and gusts alone stay below 95 times in 100; `no_gap`: what the search closes on
+        records without a gap, there by the whole residual (rms over channels, before and after).
+    """
+    progress("climbing the evidence ladder: the runner-up")
+    rival = runner_up(posterior, explained)
+    paths = change.paths
+    rungs = [_rung("nothing", [], replace(tested, after=tested.before), seed)]
+    second = _remedy_of(rival, flights, candidates, evidences, baseline, posterior)
+    rungs.append(_rung("runner-up", _names(rival), replace(tested, after=_squares(others, second, paths)), seed))
+    rungs.append(_rung("diagnosed", _names(explained), tested, seed))
+    progress("climbing the evidence ladder: a regression that knows no physics")
+    box = black_box.train([driven(f, f.parameters, paths) for f in flights])
+    pushed = [gap.squares(f, Remedy(), paths, partial(black_box.Pushed, box, driven(f, f.parameters, paths)))
+              for f in others]
+    rungs.append(_rung("black box", [], replace(tested, after=np.concatenate(pushed)), seed))
+    progress("climbing the evidence ladder: the same search where there is no gap")
+    return {"rungs": rungs, "noise95": gap.null_quantile(tested.alone),
+            "no_gap": search_on_nothing(flights, others, candidates, baseline, evidences, seed)}
+
+
+def runner_up(posterior: Posterior, explained: Hypothesis | None) -> Hypothesis:
+    """The most probable explanation that shares nothing with the diagnosed one, and is one."""
+    taken = set(explained.effects) if explained is not None else set()
+    strange = explained is not None and explained.unknown is not None
+    return next(h for h in posterior.hypotheses if (h.effects or h.unknown is not None)
+                and h is not explained and not taken & set(h.effects) and not (strange and h.unknown is not None))
+
+
+def search_on_nothing(flights: Sequence[Reconstruction], others: Sequence[Reconstruction], candidates: Bank,
+                      baseline: Baseline, evidences: Sequence[Evidence], seed: int) -> dict[str, Any]:
+    """Diagnose synthetic records of the model itself and fly the best explanation, believed or not."""
+    sigma = float(np.mean([e.sigma_w for e in evidences]))
+    made, tests = ([piece for i, flight in enumerate(records)
+                    for piece in synthetic(flight, sigma, seed + 2000 + start + 50 * i)]
+                   for start, records in ((0, flights), (1000, others)))  # fmt: skip
+    untestable = not_testable(made, candidates)
+    found, posterior = fit(made, candidates, untestable, baseline, lambda text: None)
+    best = runner_up(posterior, None)
+    change = _remedy_of(best, made, candidates, found, baseline, posterior)
+    before, after = (float(np.sqrt(np.nanmean(_squares(tests, what)))) for what in (Remedy(), change))
+    return {"effects": _names(best), "probability_no_gap": posterior.none, "before": before, "after": after,
+            "closure": 1.0 - after / before}
+
+
+def synthetic(flight: Reconstruction, sigma: float, seed: int) -> list[Reconstruction]:
+    """Records of the model itself under the controls of a record, in pieces, with gusts and the record's noise.
+
+    Commands are left out: the positions are recorded ones, and how they follow is no question here.
+    """
+    length = min(round(PIECE / flight.dt), len(flight.time) - 1)
+    first = np.arange(0, len(flight.time) - length, length)
+    first = first if len(first) else np.zeros(1, np.intp)
+    start = np.column_stack([flight.channel(name)[first] for name in FREE])
+    rows = np.repeat(flight.parameters, len(first))
+    y = fly(flight, rows, first, start, length, (max(sigma, 1e-6), seed))
+    out = []
+    for i, k in enumerate(first):
+        span = slice(k + 1, k + 1 + length)
+        measured = np.full((length, len(MEASURED)), np.nan)
+        measured[:, : len(COMPARED)] = np.where(np.isfinite(flight.measured[span, : len(COMPARED)]), y[i], np.nan)
+        out.append(replace(
+            flight, time=flight.time[span] - flight.time[k + 1], measured=measured, commands={},
+            controls={n: v[span] for n, v in flight.controls.items()},
+            positions={n: v[span] for n, v in flight.positions.items()}, altitude=flight.altitude[span]))
+    return out
+
+
+def _remedy_of(hypothesis: Hypothesis, flights: Sequence[Reconstruction], candidates: Bank,
+               evidences: Sequence[Evidence], baseline: Baseline, posterior: Posterior) -> Remedy:
+    unknown = None if hypothesis.unknown is None else describe_unknown(
+        flights, candidates, evidences, baseline, posterior.tempering, hypothesis)
+    return remedy(hypothesis, unknown)
+
+
+def _squares(flights: Sequence[Reconstruction], change: Remedy, paths: gap.Paths = ()) -> FloatArray:
+    """Mean square residuals [windows, channels] of several records."""
+    return np.concatenate([gap.squares(flight, change, paths) for flight in flights])
+
+
+def _names(hypothesis: Hypothesis | None) -> list[str]:
+    if hypothesis is None:
+        return []
+    return [*hypothesis.effects, *(["unknown"] if hypothesis.unknown is not None else [])]
+
+
+def _rung(name: str, effects: list[str], energy: gap.Energy, seed: int) -> Rung:
+    held = gap.held_out(energy, seed)
+    return {"name": name, "effects": effects, "gap": held["after"],
+            **{k: held[k] for k in ("closure", "closure_low95", "closure_high95")}}  # fmt: skip
+
