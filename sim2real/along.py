@@ -64,6 +64,7 @@ X = columns(STATE, STATES)
 MOVED = len(STATES)  # then roll and pitch, corrected through the quaternion
 _E0, _E1, _E2, _E3 = (int(c) for c in columns(STATE, ("e0", "e1", "e2", "e3")))
 _Y = columns(MEASUREMENT, MEASURED[:11])
+_FELT = np.array([MEASURED.index(c) for c in ("ax", "ay", "az")])
 _PHI = int(columns(MEASUREMENT, ("phi",))[0])
 _SURFACE, _ASKED = columns(STATE, SURFACES), columns(COMMAND, SURFACES)
 _FLAP, _POWER_L, _POWER_R, _U, _GUST_U, _ALTITUDE = (int(c) for c in columns(
@@ -164,7 +165,7 @@ def advance(block: Any, states: Any, parameters: Any, speeds: Any, count: int, d
 
 @entry
 def along(table: Any, controls: Any, first: Any, measured: Any, stretch: Any, gain: Any, force_at: Any,
-          force: Any, error_at: Any, error: Any, out: Any) -> None:
+          force: Any, error_at: Any, error: Any, known: Any, out: Any) -> None:
     """Fly the rows of a fleet (`table`: of `Fleet.table`) along a record, LANES at a time to its end.
 
     Nothing draws noise but gusts with an intensity above STILL; ice stays as it is.
@@ -177,6 +178,8 @@ def along(table: Any, controls: Any, first: Any, measured: Any, stretch: Any, ga
         gain: [1 or n, steps, FED_BACK, states then roll and pitch], the last step's goes on; empty for free flight.
         force_at, force: (row, state) of what is added to states [F, 2], and how much at each sample [F, N].
         error_at, error: (row, channel) of what is added to readings [E, 2], and how much at each sample [E, N].
+        known: what every row is accelerated by at each sample beside its own forces, m/s2 and rad/s2 in the order of
+            STATES [N, 6]; empty if nothing.
         out: [steps, n, channels]; measured less predicted, or in free flight predicted.
     """
     states, readings, currents = rows(table, 0, STATE), rows(table, 1, MEASUREMENT), rows(table, 2, CURRENT)
@@ -197,6 +200,8 @@ def along(table: Any, controls: Any, first: Any, measured: Any, stretch: Any, ga
                 i = at + j
                 steer(x[i], u[i], controls[first[i] + k], controls[first[i] + k + 1])
                 fill(block, AT_COMMAND, j, u[i])
+                for c in range(6 if len(known) > 0 else 0):
+                    x[i, X[c]] += known[first[i] + k + 1, c]*clock.dt
                 if k % PRESENTED == 0:
                     present_aircraft(states[i], parameters[i], currents[i])
                     fill(block, AT_CURRENT, j, held[i])
@@ -207,6 +212,8 @@ def along(table: Any, controls: Any, first: Any, measured: Any, stretch: Any, ga
                 sense(states[i], readings[i], currents[i], parameters[i], recall_loads(block, j),
                       clock.dt)
                 read(out[k, i], x[i], y[i], p[i])
+                for c in range(3 if len(known) > 0 else 0):
+                    out[k, i, _FELT[c]] += known[first[i] + k + 1, c]
             for j in range(len(error)):
                 if at <= error_at[j, 0] < at + count:
                     out[k, error_at[j, 0], error_at[j, 1]] += error[j, k + 1]

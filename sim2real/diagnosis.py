@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from sim2real.manoeuvre import next_manoeuvre
 from sim2real.reconstruct import Reconstruction, reconstruct
 from sim2real.references import Baseline, fit_baseline
 from sim2real.remedy import Remedy, leading, remedy, resimulation, values_of
+from sim2real.rollout import Rollout, difference, flying_as
 from sim2real.weigh import Progress, fit
 from sim2real.where import components, regimes
 
@@ -66,7 +67,8 @@ class Details:
 
 def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] = (),
              reference: Sequence[FlightRecord] = (), without: Iterable[str] = (), seed: int = 0,
-             progress: Progress = lambda text: None, climb: bool = False) -> Diagnosis:
+             progress: Progress = lambda text: None, climb: bool = False, simulator: Rollout | None = None
+             ) -> Diagnosis:  # fmt: skip
     """Diagnose the gap between the model and the aircraft that flew `records`.
 
     Args:
@@ -77,6 +79,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         seed: of the synthetic records behind the gap without a gap.
         progress: told what is being done.
         climb: measure the evidence ladder on the held-out records too (as long again as the diagnosis).
+        simulator: a simulator of the user's in the place of ours (`sim2real.rollout`).
 
     Raises:
         InputError: no records, an unknown effect in `without`, or a record that cannot be used.
@@ -92,9 +95,9 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     baseline = Baseline(aircraft.load(), np.eye(len(candidates.nuisances)))
     if reference:
         progress("fitting the model to the reference flights")
-        baseline = fit_baseline([reconstruct(r) for r in reference], candidates)
-    flights = [reconstruct(r, baseline.near(r)) for r in records]
-    others = [reconstruct(r, baseline.near(r)) for r in held_out]
+        baseline = fit_baseline(_reconstructed(reference, None, simulator), candidates)
+    flights = _reconstructed(records, baseline, simulator)
+    others = _reconstructed(held_out, baseline, simulator)
     untestable = not_testable(flights, candidates)
     evidences, posterior = fit(flights, candidates, untestable, baseline, progress)
     verdict, hypotheses = judge(posterior)
@@ -137,6 +140,16 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         seconds=time.perf_counter() - began,
         details=Details(tuple(flights), tuple(others), tuple(evidences), posterior, change, training, tested),
     )
+
+
+def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, simulator: Rollout | None
+                   ) -> list[Reconstruction]:  # fmt: skip
+    """Records over the model that references corrected, or over a simulator of the user's so corrected."""
+    flights = [reconstruct(record, None if baseline is None else baseline.near(record)) for record in records]
+    if simulator is None:
+        return flights
+    return [replace(flight, known=flying_as(reconstruct(record), simulator).known)
+            for flight, record in zip(flights, records, strict=True)]
 
 
 def ranked(posterior: Posterior) -> list[tuple[str, float]]:
@@ -210,6 +223,7 @@ def provenance(flights: Sequence[Reconstruction], others: Sequence[Reconstructio
                      "sigma_w": e.sigma_w, "notes": list(f.notes)} for f, e in zip(flights, evidences, strict=True)],
         "held_out": [{"sha256": content_hash(f.record), "samples": len(f.time), "notes": list(f.notes)}
                      for f in others],
+        "simulator": [difference(f) for f in flights] if flights[0].known is not None else None,
         "references": references, "without": list(without), "library": len(effects.LIBRARY),
         "sources": source_hash("sim2real"), "seed": seed,
         "assumptions": {"prior_no_gap": P_NONE, "prior_unknown": P_UNKNOWN, "baseline_spread": SPREAD},

@@ -96,7 +96,7 @@ def fly(flight: Reconstruction, manoeuvre: Manoeuvre) -> Reconstruction:
             controls[name] = controls[name] + step * shape
     for name in ("power_left", "power_right"):
         controls[name] = np.maximum(controls[name] * (1.0 + manoeuvre.power_ramp * time), 0.0)
-    made = replace(flight, time=time, measured=np.zeros((len(time), len(MEASURED))), controls=controls,
+    made = replace(flight, known=None, time=time, measured=np.zeros((len(time), len(MEASURED))), controls=controls,
                    altitude=np.full(len(time), height))
     flown = Predictor(made, flight.parameters)
     at = {"airspeed": manoeuvre.airspeed, "alpha": state.alpha, "beta": state.beta, "p": 0.0, "q": 0.0, "r": 0.0,

@@ -88,7 +88,8 @@ class Predictor:
                 if not q.sensor and q.target in "uvw"]  # fmt: skip
         errors = felt + [(q.row, MEASURED.index(q.target), q.series) for q in pushes if q.sensor]
         along(self.fleet.table(), controls, start, np.ascontiguousarray(flight.measured), stretch,
-              np.ascontiguousarray(np.swapaxes(K, 2, 3)), *_listed(forces), *_listed(errors), out)
+              np.ascontiguousarray(np.swapaxes(K, 2, 3)), *_listed(forces), *_listed(errors),
+              np.zeros((0, 6)) if flight.known is None else flight.known, out)
         return out
 
     def read(self) -> FloatArray:

@@ -43,6 +43,8 @@ class Reconstruction:
         power_from: "torque", "thrust", "throttle" or "balance".
         noise: standard deviation per channel of MEASURED, from the record's own high frequencies.
         notes: what was assumed.
+        known: accelerations (m/s2 along x, y, z, rad/s2 about them) that the model is given beside its own [N, 6]: what
+            another simulator has and ours has not (`sim2real.rollout`).
     """
 
     name: str
@@ -58,6 +60,7 @@ class Reconstruction:
     power_from: str
     noise: FloatArray
     notes: tuple[str, ...]
+    known: FloatArray | None = None
 
     def channel(self, name: str) -> FloatArray:
         """One column of `measured`, gaps filled by interpolation; zeros where it was not recorded."""

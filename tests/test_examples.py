@@ -18,7 +18,7 @@ def run(name: str, *arguments: str) -> str:
     return done.stdout
 
 
-LINES = {"first_flight.py": 6, "own_effect.py": 3, "estimator_in_the_loop.py": 2}
+LINES = {"first_flight.py": 6, "own_effect.py": 3, "own_simulator.py": 3, "estimator_in_the_loop.py": 2}
 
 
 @pytest.mark.parametrize("name", LINES)

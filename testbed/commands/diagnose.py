@@ -31,11 +31,14 @@ RECORDS = click.Path(path_type=Path)
               help="Write diagnosis.json and report.html there.")  # fmt: skip
 @click.option("--ladder", is_flag=True,
               help="Also close the gap by a rival, by a regression without physics, and where there is none.")
+@click.option("--simulator", metavar="FILE.py", type=click.Path(path_type=Path),
+              help="A simulator of your own in the place of ours, as in examples/own_simulator.py.")
 @click.option("--policies", is_flag=True,
               help="Also rank controllers by the simulator before and after, and on the aircraft as diagnosed.")
 @own_effects
 def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tuple[Path, ...],
-            without: tuple[str, ...], out: Path | None, ladder: bool, policies: bool, as_json: bool, seed: int) -> None:
+            without: tuple[str, ...], out: Path | None, ladder: bool, simulator: Path | None, policies: bool,
+            as_json: bool, seed: int) -> None:
     """Say where the model and the aircraft that flew RECORD part, and which unmodelled effect causes it.
 
     Records are .csv, .parquet or SIDPAC's .mat. Every effect of `icing effects` is tried, beside "no gap" and "nothing
@@ -45,10 +48,12 @@ def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tu
     from rich.console import Console
 
     from sim2real.diagnosis import diagnose
+    from sim2real.rollout import from_file
 
     with Console(stderr=True).status("reading the records") as status:
+        own = None if simulator is None else from_file(simulator)
         found = diagnose(read_all(records), read_all(held_out), read_all(reference), without, seed, status.update,
-                         climb=ladder)  # fmt: skip
+                         climb=ladder, simulator=own)  # fmt: skip
         result = answer(found)
         if policies:
             result["policies"] = rank_policies(result, seed, status.update)
