@@ -133,7 +133,7 @@ def flying_as(flight: Reconstruction, rollout: Rollout) -> Reconstruction:
     ours = _ours(flight, at, reached, kept) - _ours(flight, at, reached, reached[:, _ALPHA])
     known = np.zeros((steps + 1, 6))
     known[1:] = settled + remembered - ours
-    absent = np.isnan(known).any(axis=0)
+    absent = [bool(np.isnan(column).any()) for column in known.T]
     lacking = [name for name, gone in zip(_FELT, absent, strict=True) if gone and name in LONGITUDINAL]
     if lacking:
         raise InputError(f"your simulator reads no {', '.join(lacking)}: a diagnosis needs ax, az and q")
