@@ -14,8 +14,7 @@ A simulator started anew has forgotten what it remembers beside the state of the
 tail, lags of its own). What that is worth is found where it has flown for 0.3 s and more: its acceleration there less
 that of a restart from the same state. For ours likewise; the difference is added.
 
-A gap can also be told without any effect: `residual_coefficients` restarts your simulator along the record and
-gives what is missing in each force and moment coefficient, `missing_terms` the regressors that describe it.
+A gap can also be told without any effect: `sim2real.missing_terms`.
 """
 
 from __future__ import annotations
@@ -30,29 +29,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
-from estimators.regression.stepwise import Stepwise, stepwise
 from icing_env import aircraft
 from icing_env.atmosphere import density
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
 from icing_env.sensors import SENSOR_PARAMETERS
-from sim2real.channels import MEASURED, SURFACES, TOLERANCE
+from sim2real.channels import TOLERANCE
 from sim2real.predictor import Predictor, put
 from sim2real.reconstruct import LONGITUDINAL, Reconstruction, reconstruct
 from sim2real.windows import COMPARED, FREE, cut
 
 BEGIN = 0.5  # s of the record that the start of a window is taken from
-HORIZON, MOST = 0.1, 600  # s flown after each restart for residual coefficients, and how many restarts at most
 SMOOTH = 0.3  # s of the measured states from which both simulators are started at every sample
 WARM, RUN = 0.3, 1.0  # s after which your simulator remembers what it would in flight; s flown at a time
 _FELT = ("ax", "ay", "az", "p", "q", "r")
 _FORCES, _RATES = ([COMPARED.index(c) for c in names] for names in (_FELT[:3], _FELT[3:]))
 _RATES_FREE, _STATE, _ALPHA = [FREE.index(c) for c in _FELT[3:]], [COMPARED.index(c) for c in FREE], FREE.index("alpha")
-REGRESSORS = {
-    "CX": ("alpha", "alpha*alpha", "airspeed", "elevator"), "CZ": ("alpha", "q", "elevator", "alpha*alpha"),
-    "Cm": ("alpha", "q", "elevator", "alpha*alpha", "airspeed"), "CY": ("beta", "p", "r", "rudder"),
-    "Cl": ("beta", "p", "r", "aileron", "rudder"), "Cn": ("beta", "p", "r", "aileron", "rudder"),
-}  # fmt: skip
 
 
 class Rollout(Protocol):
@@ -207,7 +199,7 @@ def difference(flight: Reconstruction) -> dict[str, float]:
     """RMS of `known`, as coefficients: how far your simulator is from ours."""
     if flight.known is None:
         return {}
-    found = _as_coefficients(flight.known[1:], flight, flight.channel("airspeed")[1:])
+    found = as_coefficients(flight.known[1:], flight, flight.channel("airspeed")[1:])
     return {name: float(np.sqrt(np.mean(series**2))) for name, series in found.items()}
 
 
@@ -247,49 +239,7 @@ def fly_yours(rollout: Rollout, flight: Reconstruction, first: int, start: Float
     return out
 
 
-def residual_coefficients(rollout: Rollout, record: FlightRecord) -> dict[str, FloatArray]:
-    """What your simulator lacks in CX, CY, CZ, Cl, Cm, Cn along a record, by restarting it at the measured state.
-
-    Each restart flies 0.1 s; the mean specific force and the change of the rates over that time are compared with those
-    measured. Moments are the inertia matrix times the difference of angular accelerations: at the same state and rates
-    everything else is equal. What the motion has answered by then makes them a tenth too small where damping is strong.
-
-    Returns:
-        time, the coefficients, and the regressors' channels as means over the 0.1 s, each (M,); M at most 600.
-    """
-    flight = reconstruct(record)
-    steps = max(1, round(HORIZON / flight.dt))
-    last = len(flight.time) - steps - 1
-    at = np.arange(0, last + 1, max(1, -(-last // MOST)))
-    measured = {name: flight.channel(name) for name in MEASURED[:11]}
-    lacking = np.empty((len(at), 6))
-    means: dict[str, list[float]] = {name: [] for name in (*MEASURED[:8], *SURFACES)}
-    for i, k in enumerate(at):
-        start, after = np.array([measured[name][k] for name in FREE]), slice(k + 1, k + steps + 1)
-        told = fly_yours(rollout, flight, int(k), start, steps)
-        for j, name in enumerate(("ax", "ay", "az")):
-            lacking[i, j] = np.mean(measured[name][after] - told[:, COMPARED.index(name)])
-        for j, name in enumerate("pqr", start=3):
-            lacking[i, j] = (measured[name][k + steps] - told[-1, COMPARED.index(name)]) / (steps * flight.dt)
-        for name, kept in means.items():
-            kept.append(float(np.mean((flight.controls if name in SURFACES else measured)[name][after])))
-    channels = {name: np.array(kept) for name, kept in means.items()}
-    return {"time": flight.time[at]} | _as_coefficients(lacking, flight, channels["airspeed"]) | channels
-
-
-def missing_terms(residual: Mapping[str, FloatArray]) -> dict[str, Stepwise]:
-    """Regressors (deviations from their mean) that describe what is missing, by coefficient, as stepwise finds them."""
-    out = {}
-    for name, terms in REGRESSORS.items():
-        if name not in residual:
-            continue
-        away = {f: residual[f] - np.mean(residual[f]) for term in terms for f in term.split("*")}
-        candidates = {term: np.prod([away[f] for f in term.split("*")], axis=0) for term in terms}
-        out[name] = stepwise(candidates, residual[name])
-    return out
-
-
-def _as_coefficients(lacking: FloatArray, flight: Reconstruction, airspeed: FloatArray) -> dict[str, FloatArray]:
+def as_coefficients(lacking: FloatArray, flight: Reconstruction, airspeed: FloatArray) -> dict[str, FloatArray]:
     """Specific forces and angular accelerations [M, 6] as coefficients, those that your simulator has."""
     p = flight.parameters[0]
     force = 0.5 * density(float(np.median(flight.altitude))) * airspeed**2 * p["wing_area"]

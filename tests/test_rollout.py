@@ -17,6 +17,7 @@ from icing_env.record import FlightRecord, write
 from icing_env.sensors import SENSOR_PARAMETERS
 from sim2real import rollout
 from sim2real.diagnosis import diagnose
+from sim2real.missing_terms import missing_terms, residual_coefficients
 from sim2real.predictor import Predictor, put
 from sim2real.reconstruct import reconstruct
 from sim2real.windows import COMPARED
@@ -86,8 +87,8 @@ def test_other_equations_with_the_published_derivatives_are_our_aircraft():
 
 
 def test_residual_coefficients_show_the_weak_elevator():
-    residual = rollout.residual_coefficients(OWN["rollout"], flown().slice(0.0, 30.0))
-    found = rollout.missing_terms(residual)["Cm"]
+    residual = residual_coefficients(OWN["rollout"], flown().slice(0.0, 30.0))
+    found = missing_terms(residual)["Cm"]
     lacking = dict(zip(found.terms, found.fit.theta, strict=True))
     assert lacking["elevator"] == pytest.approx(-0.3 * 1.740, rel=0.25)
     assert set(residual) >= {"CX", "CY", "CZ", "Cl", "Cm", "Cn", "time"}
