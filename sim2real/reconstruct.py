@@ -19,8 +19,8 @@ from icing_env import aircraft
 from icing_env.atmosphere import density, pressure, static_air
 from icing_env.errors import InputError
 from icing_env.propulsion import power_available
-from icing_env.record import FlightRecord, FloatArray
-from sim2real.channels import MEASURED, NOISE_FLOOR, SURFACES
+from icing_env.record import DataProblem, FlightRecord, FloatArray
+from sim2real.channels import LATERAL, MEASURED, NOISE_FLOOR, SURFACES
 
 LONGEST_STEP, SHORTEST_STEP = 0.1, 0.018  # s: records are 10 to 200 Hz; faster ones are thinned to about 50 Hz
 LONGITUDINAL = ("airspeed", "alpha", "q", "theta", "ax", "az", "elevator")
@@ -94,6 +94,7 @@ def reconstruct(record: FlightRecord, base: NDArray | None = None) -> Reconstruc
                          f"time, {', '.join(LONGITUDINAL)}")
     if grid.dt > LONGEST_STEP * 1.01:
         raise InputError(f"record '{record.meta.name}' has {1/grid.dt:.3g} samples/s; at least 10 are needed")
+    record = record.with_problems(_unrecorded(values, record))
     every = max(1, round(0.02 / grid.dt)) if grid.dt < SHORTEST_STEP else 1
     notes: list[str] = []
     if every > 1:
@@ -117,6 +118,15 @@ def reconstruct(record: FlightRecord, base: NDArray | None = None) -> Reconstruc
             measured[:, MEASURED.index(name)] = np.nan  # it drives the simulation: nothing is left to compare
     return Reconstruction(record.meta.name, record, time, dt, measured, controls, positions, commands, row, altitude,
                           source, _noise(measured), tuple(notes))
+
+
+def _unrecorded(values: dict[str, FloatArray], record: FlightRecord) -> list[DataProblem]:
+    """Channels whose absence keeps a lateral diagnosis back, where a lateral control was recorded."""
+    if "aileron" not in values and "rudder" not in values:
+        return []
+    start, end = float(record.time[0]), float(record.time[-1])
+    return [DataProblem(name, "not recorded: a lateral diagnosis lacks it", start, end, False)
+            for name in (*LATERAL, "aileron", "rudder") if name not in values]
 
 
 def _measured(record: FlightRecord, time: FloatArray, values: dict[str, FloatArray], dt: float) -> FloatArray:

@@ -45,7 +45,7 @@ def test_tiers_gusts_forms_and_effects_are_all_drawn():
 def test_sizes_stay_within_what_the_protocol_allows():
     drawn = [part for d in draw.designs(2400, 1) if d.tier == "single" for part in d.parts]
     ratios = [abs(size / effects.BY_NAME[name].typical) for name, _, size in drawn]
-    assert 0.2 <= min(ratios) and max(ratios) <= 2.5
+    assert min(ratios) >= 0.2 and max(ratios) <= 2.5
     assert set(draw.LARGER) <= {e.name for e in effects.EFFECTS}
 
 
