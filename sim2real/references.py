@@ -29,8 +29,11 @@ CHANGES = 1.0  # prior standard deviation of that change at twice the dynamic pr
 # What the published spread leaves alone and another aircraft may have: standard deviations (assumed)
 BEYOND: dict[str, float] = {
     "CY_0": 1e-3, "Cl_0": 3e-4, "Cn_0": 3e-4, "Cl_alpha": 2e-3, "Cm_CT": 0.02, "CZ_CT": 0.02, "Cm_elevator_CT": 0.06,
-    "Cm_alphadot": 0.4, "engine_arm_z": 0.02, "thrust_factor_left+thrust_factor_right": 0.02}  # fmt: skip
-FIXED = ("mass", "thrust")  # a matter of each record
+    "Cm_alphadot": 0.4, "engine_arm_z": 0.02, "thrust_factor_left+thrust_factor_right": 0.02, "CX_elevator": 5e-3,
+    "CZ_alpha2": 0.3, "Cm_alpha2": 0.1, "Cm_alpha_elevator": 0.1, "CY_alpha_beta": 0.1, "Cl_alpha_beta": 0.02,
+    "Cn_alpha_beta": 0.02}  # fmt: skip
+FIXED = ("mass", "thrust", "filter_frequency", "vane_lag")  # a matter of each record and its recorder
+REPEATABLE = 0.2  # standard deviations: no number is known better for another flight (assumed; 1 %, 4 ms of a lag)
 LEAST = 1e-3  # of a published step: a number near zero has a nuisance that hardly moves it
 
 
@@ -143,7 +146,7 @@ def _baseline(candidates: Bank, moves: Sequence[Nuisance], x: FloatArray, precis
         if not nuisance.absolute:
             now = abs(float(row[_first(nuisance)][0])) * nuisance.factor
             unit[j] = max(now / move.factor, LEAST)
-    out = unit[:, None] * np.linalg.inv(covariance) * unit
+    out = np.linalg.inv(covariance / unit[:, None] / unit + REPEATABLE**2 * np.eye(count))
     for j, nuisance in enumerate(candidates.nuisances):
         if nuisance.name in FIXED:
             out[j], out[:, j] = 0.0, 0.0

@@ -18,7 +18,12 @@ Case = dict[str, Any]
 
 
 def flat(answer: dict[str, Any], key: dict[str, Any]) -> Case:
-    """What the figures need of one answer and its key; an answer {"error": ...} has probability 0 and no closure."""
+    """What the figures need of one answer and its key.
+
+    An answer {"error": ...}, or one whose probabilities are no numbers, has failed: probability 0 and no closure.
+    """
+    if any(h["probability"] is None for h in answer.get("hypotheses", [])):
+        answer = {"error": "probabilities are not numbers", "seconds": answer.get("seconds")}
     hypotheses = answer.get("hypotheses", [])
     truth = set(key["effects"])
     places = answer.get("where", {}).get("components", {})
