@@ -17,6 +17,7 @@ from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
 from sim2real.candidates import NUISANCE_STEP, Bank
+from sim2real.form import gain, room, split, terms_of, without
 from sim2real.generic import UnknownFit, beside, fit_unknown
 from sim2real.sets import INTEGRATED, SetFit, grow, integrate, pairs
 from sim2real.singles import EffectFit, ambiguity, fit_family
@@ -30,18 +31,27 @@ KEPT = 1e-5  # sets of several effects less probable than this are dropped
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """One explanation: a set of effects (empty: none) and perhaps something unknown beside it."""
+    """One explanation: a set of effects (empty: none) and perhaps something unknown beside it.
+
+    `form`: log evidence that the set gains where its effects may have another form than the library's.
+    """
 
     fit: SetFit
     unknown: UnknownFit | None
     log_prior: float
     log_evidence: float
+    form: float = 0.0
     probability: float = 0.0
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Names, in alphabetical order."""
         return tuple(sorted(self.fit.effects))
+
+    @property
+    def log_posterior(self) -> float:
+        """But for a constant."""
+        return self.log_prior + self.log_evidence + self.form
 
     @property
     def weights(self) -> dict[int, float]:
@@ -155,19 +165,22 @@ def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str],
         log = float(logsumexp([e.log_evidence for e in own]) - np.log(len(own)))
         found.append(Hypothesis(_alone(fits[name]), None, single, log))
     found += _several(reduced, bank, [i for i, f in enumerate(bank.families) if f in by_family])
-    leading = sorted(found, key=lambda h: -(h.log_prior + h.log_evidence))[:BESIDE]
+    found = [replace(h, form=_form(reduced, bank, h.fit)) if h.effects else h for h in found]
+    leading = sorted(found, key=lambda h: -h.log_posterior)[:BESIDE]
     if found[0] not in leading:
         leading.append(found[0])
     unknown_fits = tuple(fit_unknown(reduced, bank))
     for known in leading:
-        found += _with_unknown(reduced, bank, known, unknown_fits)
+        form, beside_it = _with_unknown(reduced, bank, known, unknown_fits)
+        found[found.index(known)] = replace(known, form=max(known.form, form))
+        found += beside_it
     kept = normalised(found)
     return Posterior(kept, fits, unknown_fits, ambiguity(reduced, fits, _inclusion(kept)), reduced)
 
 
 def normalised(found: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
     """Probabilities of hypotheses, sorted; sets of several that are next to impossible are dropped."""
-    logs = np.array([h.log_prior + h.log_evidence for h in found])
+    logs = np.array([h.log_posterior for h in found])
     share = np.exp(logs - logsumexp(logs))
     keep = [i for i, h in enumerate(found) if share[i] > KEPT or (len(h.effects) < 2 and not (h.effects and h.unknown))]
     total = float(share[keep].sum())
@@ -213,16 +226,33 @@ def _merged(fits: list[SetFit], log_prior: float) -> list[Hypothesis]:
     return [Hypothesis(fit, None, log_prior, fit.log_evidence) for fit in chosen.values()]
 
 
+def _form(reduced: FloatArray, bank: Bank, fit: SetFit) -> float:
+    """What another form of its effects adds to a set's evidence (see `sim2real.form`), its sizes free to give way."""
+    terms, slopes = terms_of(fit, reduced, bank.terms), _slopes(fit)
+    first = 1 + len(slopes)
+    chosen = np.zeros((first + len(terms), len(reduced)))
+    chosen[0, 0] = 1.0
+    for row, weight in (fit.weights or {}).items():
+        chosen[0, row] = weight
+    for m, slope in enumerate(slopes):
+        chosen[1 + m, list(slope)] = list(slope.values())
+    chosen[range(first, len(chosen)), [term.row for term in terms]] = 1.0
+    return gain(*without(chosen @ reduced @ chosen.T, first), room(fit, reduced, terms))
+
+
 def _with_unknown(reduced: FloatArray, bank: Bank, known: Hypothesis,
-                  alone: Sequence[UnknownFit]) -> list[Hypothesis]:
-    """The same explanation with something unknown beside it, or the unknown alone where it explains nothing."""
-    fits = alone if not known.effects else fit_unknown(beside(reduced, bank, known.fit, _slopes(known.fit)), bank)
+                  alone: Sequence[UnknownFit]) -> tuple[float, list[Hypothesis]]:
+    """An explanation with something unknown beside it (alone where it explains nothing), and its form's evidence."""
+    fits, form = list(alone), 0.0
+    if known.effects:
+        fits = fit_unknown(beside(reduced, bank, known.fit, _slopes(known.fit)), bank)
+        form, fits = split(known.fit, reduced, fits)
     if not fits:
-        return []
+        return form, []
     best = max(fits, key=lambda u: u.log_evidence)
-    gain = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
+    gained = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
     share = np.log(P_BESIDE / (1.0 - P_NONE)) + known.log_prior if known.effects else np.log(P_UNKNOWN)
-    return [Hypothesis(known.fit, best, float(share), known.log_evidence + gain)]
+    return form, [Hypothesis(known.fit, best, float(share), known.log_evidence + gained)]
 
 
 def _slopes(fit: SetFit) -> list[dict[int, float]]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.attribution import Hypothesis, Posterior, nuisance_mean, reduce, with_prior
-from sim2real.candidates import DEVIATION, GENERIC, GENERIC_SIZE, Bank, Nuisance, shifted
+from sim2real.candidates import DEVIATION, GENERIC, GENERIC_SIZE, Bank, Nuisance, shifted, unit_of
 from sim2real.channels import SURFACES, TOLERANCE
 from sim2real.evidence import Evidence, compare
 from sim2real.reconstruct import Reconstruction
@@ -31,6 +31,7 @@ from sim2real.weigh import nearer
 SHOWN = DETECTABLE  # standard errors that a term has to stand out
 ROUNDS = 3  # of fitting: each flies the aircraft described so far
 RIDGE = 0.1  # prior precision of a term in its own unit (assumed: a standard deviation of three)
+LATE = ("_dot", "acceleration", "slow_phi", "slow_theta", "slow_ax", "slow_ay")  # terms with a memory
 SCALE, DELAY = 0.1, 0.1  # unit of a channel's scale error, and s of its delay
 COEFFICIENT = {"x_force": "CX", "y_force": "CY", "z_force": "CZ", "rolling_moment": "Cl", "pitching_moment": "Cm",
                "yawing_moment": "Cn"}  # fmt: skip
@@ -49,7 +50,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class Description:
-    """An unknown in terms that can be flown.
+    """An unknown in terms, most of which can be flown (no values where they cannot).
 
     Attributes:
         component: where it enters.
@@ -67,7 +68,7 @@ class Description:
     def kind(self) -> str:
         """static, dynamic (a delay) or time_varying, by the surest term that is not constant."""
         leading = next((name for name, _, _ in self.terms if name != "1"), "1")
-        return "time_varying" if leading == "time" else "dynamic" if leading.endswith("_dot") else "static"
+        return "time_varying" if leading == "time" else "dynamic" if leading.endswith(LATE) else "static"
 
     def answer(self) -> dict[str, Any]:
         """As the interface has it."""
@@ -136,6 +137,10 @@ def describe_unknown(flights: Sequence[Reconstruction], candidates: Bank, eviden
     """
     assert hypothesis.unknown is not None
     component = hypothesis.unknown.component
+    flyable = {name for where, _, names in GENERIC if where == component for name in names}
+    surest = max(hypothesis.unknown.terms, key=lambda term: abs(term[1]) / term[2])
+    if surest[0] not in flyable:
+        return _told(component, hypothesis.unknown.terms)
     terms, at = choices(component, flights), condition(component, flights)
     kept, only = _others(component, candidates)
     precision = baseline.precision[np.ix_(kept, kept)]
@@ -160,6 +165,15 @@ def describe_unknown(flights: Sequence[Reconstruction], candidates: Bank, eviden
         weights = {first + j: float(step[j]) for j in range(n)}
         turn = nearer(centre + nuisance_mean(gram, only, weights), only)
     return _written(component, terms, at, x + step, chosen, covariance)
+
+
+def _told(component: str, terms: Sequence[tuple[str, float, float]]) -> Description:
+    """Terms that the effect cannot fly, as the evidence has them: those that stand out, the surest first."""
+    order = sorted(terms, key=lambda term: -abs(term[1]) / term[2])
+    kept = [term for term in order if abs(term[1]) > SHOWN * term[2]] or order[:1]
+    units = [unit_of(name, component) for name, _, _ in kept]
+    told = tuple((name, size * unit, error * unit) for (name, size, error), unit in zip(kept, units, strict=True))
+    return Description(component, told, {}, np.diag([error**2 for _, _, error in told]))
 
 
 def _others(component: str, candidates: Bank) -> tuple[list[int], Bank]:

@@ -7,22 +7,24 @@ of several records add.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from icing_env.record import FloatArray
-from sim2real.candidates import Bank, parameter_rows, pushes
+from sim2real.candidates import Bank, Term, parameter_rows, pushes
 from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR
-from sim2real.kalman import Gain, gains
-from sim2real.paths import path_residuals
+from sim2real.kalman import Gain, follow, gains
+from sim2real.paths import CORRELATED, path_residuals
 from sim2real.predictor import Push, held, innovations
 from sim2real.reconstruct import Reconstruction
 
-SIGMAS = (0.02, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.5, 2.2, 3.2)  # m/s
+SIGMAS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.55, 0.67, 0.82, 1.0, 1.2, 1.45, 1.75, 2.1, 2.6, 3.2)  # m/s
 SETTLE = 4.0  # s, until the predictor has forgotten how it was started
 CHUNK = 500  # samples whitened at a time
+FARTHEST = 1e5  # noise units: a variant that departs from flight is no nearer to the record for being a number
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class Evidence:
         gram: [rows, rows] inner products; row 0 the whitened innovations v of the model itself, row j > 0 the
             signature v_j - v of candidate j.
         gain: the predictor's, with the gust intensity that the record was whitened with.
-        factor: whitens innovations [channels, channels].
+        factor: whitens innovations [steps, channels, channels].
         samples: whitened numbers behind the inner products.
         whitened: [N, channels of MEASURED], v itself, for showing where the gap lies.
     """
@@ -58,16 +60,20 @@ def gather(flight: Reconstruction, bank: Bank, gain: Gain | None = None) -> Evid
         gain: of the predictor; the likeliest of SIGMAS if omitted.
     """
     if gain is None:
-        gain = choose_gain(flight, gains(flight, SIGMAS)).with_start()
+        gain = follow(flight, choose_gain(flight, gains(flight, SIGMAS)))
     base = innovations(flight, flight.parameters, gain.K)[:, 0]
-    factor = whitening(base[round(SETTLE / flight.dt) :], gain, flight)
+    factor = whitening(base, gain, flight)
     pushed = pushes(replace(flight, measured=predicted(flight, base)), bank)
-    return compare(flight, parameter_rows(flight, bank), pushed, gain, factor)
+    return compare(flight, parameter_rows(flight, bank), pushed, gain, factor, bank.terms)
 
 
 def compare(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain: Gain,
-            factor: FloatArray) -> Evidence:
-    """Inner products of rows flown along one record, the first being the one that the others are compared with."""
+            factor: FloatArray, terms: Sequence[Term] = ()) -> Evidence:
+    """Inner products of rows flown along one record, the first being the one that the others are compared with.
+
+    Args:
+        terms: generic ones, of which those of a path are judged there.
+    """
     moved = flown_rows(flight, rows, {q.row for q in pushed})
     index = {row: i for i, row in enumerate(moved)}
     renamed = tuple(replace(q, row=index[q.row]) for q in pushed)
@@ -76,7 +82,7 @@ def compare(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gai
     flown, samples = np.zeros((len(moved), len(moved))), 0
     whitened = np.zeros((len(left), len(MEASURED)))
     for k in range(first, len(left), CHUNK):
-        part = whiten(left[k : k + CHUNK], factor)
+        part = np.clip(whiten(left[k : k + CHUNK], factor[k : k + CHUNK]), -FARTHEST, FARTHEST)
         whitened[k : k + CHUNK] = part[:, 0]
         samples += int(np.count_nonzero(part[:, 0]))
         flat = part.transpose(0, 2, 1).reshape(-1, len(moved))
@@ -85,11 +91,11 @@ def compare(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gai
         flown += flat.T @ flat
     gram = np.zeros((len(rows), len(rows)))
     gram[np.ix_(moved, moved)] = flown
-    for path, own in path_residuals(flight, rows):
+    for path, own in path_residuals(flight, rows, terms):
         path = path[first:].copy()
         path[:, 1:] -= path[:, :1]
         gram[np.ix_(own, own)] += path.T @ path
-        samples += len(path)
+        samples += round(len(path) * min(flight.dt / CORRELATED, 1.0))
     return Evidence(gram, gain, factor, samples, whitened, flight)
 
 
@@ -128,24 +134,29 @@ def predicted(flight: Reconstruction, left: FloatArray) -> FloatArray:
     return out
 
 
-def whitening(left: NDArray[np.floating], gain: Gain, flight: Reconstruction) -> FloatArray:
-    """Matrix that makes innovations white and of unit size [channels, channels]; zero rows for absent channels."""
-    n = len(MEASURED)
-    use = [c for c in range(FED_BACK - 1) if flight.has(MEASURED[c])]
-    out = np.zeros((n, n))
-    out[np.ix_(use, use)] = np.linalg.inv(np.linalg.cholesky(gain.S[np.ix_(use, use)]))
+def whitening(left: FloatArray, gain: Gain, flight: Reconstruction) -> FloatArray:
+    """Matrices that make innovations white and of unit size [steps, channels, channels]; zero for absent channels.
+
+    Args:
+        left: the model's own innovations [steps, channels].
+    """
+    n, settled = len(MEASURED), slice(round(SETTLE / flight.dt), None)
+    use = np.array([c for c in range(FED_BACK - 1) if flight.has(MEASURED[c])], np.intp)
+    out = np.zeros((len(left), n, n))
+    S = gain.S[..., use[:, None], use]
+    out[:, use[:, None], use] = np.linalg.inv(np.linalg.cholesky(S))
     for c in range(FED_BACK - 1, n):
         if flight.has(MEASURED[c]):
-            out[c, c] = 1.0 / max(_spread(left[:, c]), NOISE_FLOOR[MEASURED[c]])
-    white = np.nan_to_num(left.astype(float)) @ out.T
+            out[:, c, c] = 1.0 / max(_spread(left[settled, c]), NOISE_FLOOR[MEASURED[c]])
+    white = whiten(left[:, None], out)[settled, 0]
     for c in use:
-        out[c] /= max(_spread(white[:, c]), 0.3)
+        out[:, c] /= max(_spread(white[:, c]), 0.3)
     return out
 
 
-def whiten(left: NDArray[np.floating], factor: FloatArray) -> FloatArray:
-    """[N, rows, channels] whitened; what was not measured counts as zero."""
-    return np.where(np.isfinite(left), left, 0.0) @ factor.T
+def whiten(left: FloatArray, factor: FloatArray) -> FloatArray:
+    """[N, rows, channels] whitened by one matrix or one per step; what was not measured counts as zero."""
+    return np.asarray(np.where(np.isfinite(left), left, 0.0) @ np.swapaxes(factor, -1, -2))
 
 
 def _spread(values: NDArray[np.floating]) -> float:

@@ -51,7 +51,11 @@ def beside(reduced: FloatArray, bank: Bank, fit: SetFit, slopes: list[dict[int, 
 
 
 def fit_unknown(reduced: FloatArray, bank: Bank) -> list[UnknownFit]:
-    """Evidence of generic terms, component by component; log_evidence is over row 0's own likelihood."""
+    """Evidence of generic terms, component by component; log_evidence is over row 0's own likelihood.
+
+    One term alone is as likely beforehand as all of a component's together: most gaps are simple, and every term that
+    is not needed costs evidence.
+    """
     out = []
     for component in dict.fromkeys(term.component for term in bank.terms):
         terms = [term for term in bank.terms if term.component == component]
@@ -59,16 +63,28 @@ def fit_unknown(reduced: FloatArray, bank: Bank) -> list[UnknownFit]:
         T, t = reduced[np.ix_(rows, rows)], -reduced[rows, 0]
         if np.max(np.diag(T)) <= 0.0:
             continue
-        logs, means, errors = [], [], []
-        for scale in SCALES:
-            inner = np.eye(len(rows)) + scale**2 * T
-            solved = np.linalg.solve(inner, scale * t)
-            logs.append(0.5 * float(scale * t @ solved) - 0.5 * float(np.linalg.slogdet(inner)[1]))
-            means.append(scale * solved)
-            errors.append(scale * np.sqrt(np.diag(np.linalg.inv(inner))))
-        k = int(np.argmax(logs))
-        found = tuple((term.name, float(m), float(e)) for term, m, e in zip(terms, means[k], errors[k], strict=True))
-        left = float(reduced[0, 0] - means[k] @ t)
-        out.append(UnknownFit(component, float(logsumexp(logs) - np.log(len(SCALES))), found, left,
-                              dict(zip(rows, (float(m) for m in means[k]), strict=True))))
+        joint = [_joint(T, t, scale) for scale in SCALES]
+        alone = np.array([0.5 * (s * t) ** 2 / (1.0 + s * s * np.diag(T)) - 0.5 * np.log1p(s * s * np.diag(T))
+                          for s in SCALES])  # fmt: skip
+        together = float(logsumexp([log for log, _, _ in joint])) - np.log(2 * len(SCALES))
+        single = float(logsumexp(alone)) - np.log(2 * alone.size)
+        if single > together:
+            k, chosen = divmod(int(np.argmax(alone)), len(rows))
+            variance = 1.0 / (SCALES[k] ** -2 + T[chosen, chosen])
+            mean, error, kept = np.array([variance * t[chosen]]), np.array([np.sqrt(variance)]), [chosen]
+        else:
+            _, mean, error = max(joint, key=lambda one: one[0])
+            kept = list(range(len(rows)))
+        found = tuple((terms[i].name, float(m), float(e)) for i, m, e in zip(kept, mean, error, strict=True))
+        out.append(UnknownFit(component, float(np.logaddexp(together, single)), found,
+                              float(reduced[0, 0] - mean @ t[kept]),
+                              {rows[i]: float(m) for i, m in zip(kept, mean, strict=True)}))
     return out
+
+
+def _joint(T: FloatArray, t: FloatArray, scale: float) -> tuple[float, FloatArray, FloatArray]:
+    """All terms of a component together: log evidence, means and standard errors."""
+    inner = np.eye(len(t)) + scale**2 * T
+    solved = np.linalg.solve(inner, scale * t)
+    log = 0.5 * float(scale * t @ solved) - 0.5 * float(np.linalg.slogdet(inner)[1])
+    return log, np.asarray(scale * solved, np.float64), scale * np.sqrt(np.diag(np.linalg.inv(inner)))

@@ -7,6 +7,7 @@ Filtering, section 5.4). The first seconds have gains of their own, from the unc
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from sim2real.reconstruct import Reconstruction
 WALK = {"u": 0.03, "v": 0.03, "w": 0.03, "p": 7e-4, "q": 7e-4, "r": 7e-4, "altitude": 0.05, "phi": 4e-4,
         "theta": 4e-4}  # fmt: skip
 TRANSIENT = 10.0  # s with gains of their own after the start
+SPAN = 1.0  # s along a record that are flown as if at one condition
 ROUGH = 60  # steps after which a gust no longer shows in third differences
 DOUBLINGS = 16  # 65536 steps
 SURFACE_NOISE = 7.6e-4  # rad, of recorded positions: 0.03 deg (configs/instruments), 1.46 times that unfiltered
@@ -34,7 +36,7 @@ class Gain:
     Attributes:
         sigma: m/s.
         K: of the steps, the last one's for good [steps, states, fed-back channels].
-        S: covariance of the steady innovations.
+        S: covariance of the steady innovations, or of each step's [steps, ...].
         model: A, C, and the covariances of the states' noise, the readings' noise and between them.
         duration: steps of the start that have gains of their own.
     """
@@ -47,57 +49,96 @@ class Gain:
 
     def with_start(self) -> Gain:
         """The same with gains of their own for the first steps, from the uncertainty of the start."""
-        first = _transient(*self.model, _start_covariance(self.sigma), self.duration)
+        first, _, _ = _recursion(*self.model, _start_covariance(self.sigma), self.duration)
         return replace(self, K=np.concatenate([first, self.K[-1:]]))
 
 
-def linearise(flight: Reconstruction) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """A, C of the one-step map about the record's middle, and B for a step of each surface [rad].
+def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),)) -> tuple[FloatArray, FloatArray,
+                                                                                        FloatArray]:
+    """A, C of the one-step map about the record's typical state in each span, and B for a step of each surface [rad].
 
-    z' = A z, y' = C z with y' the reading at the end of the step.
+    z' = A z, y' = C z with y' the reading at the end of the step; the first axis goes over the spans.
     """
     size = np.full(len(TANGENT), 1e-4)
     size[[TANGENT.index(n) for n in ("u", "v", "w", "altitude", "pitot")]] = 1e-2
     size[[i for i, n in enumerate(TANGENT) if n.startswith(("dryden", "gust"))]] = 1e-2
-    n = len(TANGENT)
-    flown = Predictor(flight, np.repeat(flight.parameters, 2 * n + 7))
-    flown.place_typical()
-    change = np.zeros((2 * n + 7, n))
+    n, m = len(TANGENT), len(spans)
+    each = 2 * n + 7
+    flown = Predictor(flight, np.repeat(flight.parameters, m * each))
+    flown.place_in(spans, each)
+    change = np.zeros((each, n))
     change[:n], change[n : 2 * n] = np.diag(size), -np.diag(size)
-    flown.correct(change)
+    flown.correct(np.tile(change, (m, 1)))
     for j, surface in enumerate(SURFACES):
-        flown.fleet.state[surface][2 * n + 2 * j] += 1e-3
-        flown.fleet.state[surface][2 * n + 2 * j + 1] -= 1e-3
+        flown.fleet.state[surface][2 * n + 2 * j :: each] += 1e-3
+        flown.fleet.state[surface][2 * n + 2 * j + 1 :: each] -= 1e-3
     for surface in SURFACES:
         flown.fleet.command[surface] = flown.fleet.state[surface]
     flown.fleet.step()
-    y, z = flown.read(), flown.tangent()
-    A = ((z[:n] - z[n : 2 * n]) / (2.0 * size[:, None])).T
-    C = ((y[:n] - y[n : 2 * n]) / (2.0 * size[:, None])).T
-    B = np.stack([(z[2 * n + 2 * j] - z[2 * n + 2 * j + 1]) / 2e-3 for j in range(3)], axis=1)
-    return A, C[:FED_BACK], B
+    y, z = flown.read().reshape(m, each, -1), flown.tangent().reshape(m, each, -1)
+    A = np.swapaxes((z[:, :n] - z[:, n : 2 * n]) / (2.0 * size[:, None]), 1, 2)
+    C = np.swapaxes((y[:, :n] - y[:, n : 2 * n]) / (2.0 * size[:, None]), 1, 2)
+    B = np.stack([(z[:, 2 * n + 2 * j] - z[:, 2 * n + 2 * j + 1]) / 2e-3 for j in range(3)], axis=2)
+    return A, C[:, :FED_BACK], B
 
 
 def gains(flight: Reconstruction, sigmas: tuple[float, ...]) -> list[Gain]:
     """Steady gain and innovation covariance for each gust intensity."""
-    A, C, B = linearise(flight)
+    A, C, B = (matrix[0] for matrix in linearise(flight))
+    out = []
+    for sigma in sigmas:
+        Qw, columns = _gusts(flight, sigma)
+        rough = roughness(A, C, A[:, columns], C[:, columns], Qw)
+        model = _noisy(flight, A, C, B, Qw, flight.noise[:FED_BACK] ** 2 - rough)
+        steady, S = _steady(*model)
+        out.append(Gain(sigma, steady[None], S, model, round(TRANSIENT / flight.dt)))
+    return out
+
+
+def follow(flight: Reconstruction, gain: Gain) -> Gain:
+    """The same gust intensity with gains along the record, linearised anew every second.
+
+    In a bank a gust moves other channels than in level flight; a gain that does not know it leaves innovations
+    coloured just where manoeuvres are, and constant errors of attitude and rates seem to be found there.
+    """
+    steps, each = len(flight.time) - 1, max(round(SPAN / flight.dt), 1)
+    spans = [slice(k, min(k + each, steps + 1)) for k in range(0, steps, each)]
+    P, (Qw, columns) = _start_covariance(gain.sigma), _gusts(flight, gain.sigma)
+    D = gain.model[1][:, columns]
+    rate = np.maximum(np.mean(np.isfinite(flight.measured[:, :FED_BACK]), axis=0), 1e-3)
+    noise = np.diag(gain.model[3] - D @ Qw @ D.T) * rate
+    K, S = [], []
+    for span, A, C, B in zip(spans, *linearise(flight, spans), strict=True):
+        model = _noisy(flight, A, C, B, Qw, noise)
+        here, covariance, P = _recursion(*model, P, min(each, steps - span.start))
+        K.append(here)
+        S.append(covariance)
+    return replace(gain, K=np.concatenate(K), S=np.concatenate(S))
+
+
+def _gusts(flight: Reconstruction, sigma: float) -> tuple[FloatArray, list[int]]:
+    """Covariance of what drives the gusts over a step, and which states it drives."""
     speed, height = float(np.median(flight.channel("airspeed"))), float(np.median(flight.altitude))
+    return gust_noise(sigma, speed, height, flight.dt), [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
+
+
+def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, Qw: FloatArray,
+           noise: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """A, C, and the covariances of the states' noise, the readings' noise and between them.
+
+    Args:
+        Qw: covariance of what drives the gusts.
+        noise: variance of every fed-back channel's own noise.
+    """
     walk = np.array([WALK.get(name, 1e-6) for name in TANGENT]) ** 2 * flight.dt
     blank = np.array([not flight.has(name) for name in MEASURED[:FED_BACK]])
     rate = np.array([max(np.mean(np.isfinite(flight.measured[:, j])), 1e-3) for j in range(FED_BACK)])
     least = np.array([NOISE_FLOOR[name] for name in MEASURED[:FED_BACK]])
-    out = []
-    for sigma in sigmas:
-        Qw = gust_noise(sigma, speed, height, flight.dt)
-        columns = [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
-        G, D = A[:, columns], C[:, columns]
-        Q = G @ Qw @ G.T + np.diag(walk) + SURFACE_NOISE**2 * (B @ B.T)
-        own = np.maximum(flight.noise[:FED_BACK] ** 2 - roughness(A, C, G, D, Qw), least**2)
-        R = np.diag(np.where(blank, 1e6, own / rate))
-        Rt, cross = D @ Qw @ D.T + R, G @ Qw @ D.T
-        steady, S = _steady(A, C, Q, Rt, cross)
-        out.append(Gain(sigma, steady[None], S, (A, C, Q, Rt, cross), round(TRANSIENT / flight.dt)))
-    return out
+    columns = [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
+    G, D = A[:, columns], C[:, columns]
+    Q = G @ Qw @ G.T + np.diag(walk) + SURFACE_NOISE**2 * (B @ B.T)
+    R = np.diag(np.where(blank, 1e6, np.maximum(noise, least**2) / rate))
+    return A, C, Q, D @ Qw @ D.T + R, G @ Qw @ D.T
 
 
 def roughness(A: FloatArray, C: FloatArray, G: FloatArray, D: FloatArray, Qw: FloatArray) -> FloatArray:
@@ -129,16 +170,17 @@ def _steady(
     return np.asarray(np.linalg.solve(S, (A @ H @ C.T + cross).T).T, np.float64), S
 
 
-def _transient(A: FloatArray, C: FloatArray, Q: FloatArray, R: FloatArray, cross: FloatArray, P: FloatArray,
-               steps: int) -> FloatArray:
-    """Gains of the first steps from the covariance `P` of the start [steps, states, channels]."""
-    out = np.empty((steps, len(A), len(C)))
+def _recursion(A: FloatArray, C: FloatArray, Q: FloatArray, R: FloatArray, cross: FloatArray, P: FloatArray,
+               steps: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Gains [steps, states, channels] and innovation covariances from the states' covariance `P`, and P after them."""
+    K, covariance = np.empty((steps, len(A), len(C))), np.empty((steps, len(C), len(C)))
     for k in range(steps):
-        S = C @ P @ C.T + R
-        out[k] = np.linalg.solve(S, (A @ P @ C.T + cross).T).T
-        P = A @ P @ A.T - out[k] @ S @ out[k].T + Q
+        PC = P @ C.T
+        covariance[k] = C @ PC + R
+        K[k] = np.linalg.solve(covariance[k], (A @ PC + cross).T).T
+        P = A @ P @ A.T - K[k] @ covariance[k] @ K[k].T + Q
         P = 0.5 * (P + P.T)
-    return out
+    return K, covariance, P
 
 
 def _start_covariance(sigma: float) -> FloatArray:

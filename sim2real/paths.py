@@ -7,7 +7,7 @@ and lever to shaft power through the spool lag of `icing_env.propulsion`.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -19,20 +19,24 @@ from icing_env.atmosphere import pressure
 from icing_env.jit import entry
 from icing_env.propulsion import power_available
 from icing_env.record import FloatArray
+from sim2real.candidates import Term, path_course
 from sim2real.channels import SURFACES
 from sim2real.reconstruct import Reconstruction
 
 POSITION_NOISE = 5.2e-4  # rad, the least believed (0.03 deg)
+TIMING = 0.002  # s: command and position are no better in step, nor is the actuator exactly of first order (assumed)
+CORRELATED = 0.5  # s in which errors of a position's calibration and timing stay what they are (assumed)
 POWER_NOISE = 0.01  # of full power
 ACTUATOR = ("lag", "rate", "min", "max", "gearing", "offset")
 UNFILTERED = 1e6  # Hz: no low pass
 STILL_COMMAND, STILL_LEVER = 1e-4, 1e-3  # rad, 0..1: a command that moves less tests nothing
 
 
-def path_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple[FloatArray, list[int]]]:
+def path_residuals(flight: Reconstruction, parameters: NDArray,
+                   terms: Sequence[Term] = ()) -> list[tuple[FloatArray, list[int]]]:
     """For every path with a recorded command: (measured - predicted)/noise [N, rows], and which rows of `parameters`.
 
-    Rows that differ from the first in nothing that the path knows are left out.
+    Rows that differ from the first in nothing that the path knows are left out; generic terms add to its prediction.
     """
     out = []
     for surface in SURFACES:
@@ -41,8 +45,12 @@ def path_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple[Fl
             rows = _differing(parameters, [f"{surface}_{quantity}" for quantity in ACTUATOR])
             measured = flight.positions[surface]
             predicted = follow(flight.commands[name], measured[0], parameters[rows], surface, flight.dt)
-            noise = max(POSITION_NOISE, _spread(measured))
-            out.append(((measured[:, None] - predicted) / noise, rows))
+            own = [term for term in terms if term.component == name.replace("command", "path")]
+            added = [predicted[:, 0] + path_course(flight, predicted[:, 0], term.name) for term in own]
+            noise = np.hypot(max(POSITION_NOISE, _spread(measured)), TIMING * np.gradient(predicted[:, 0], flight.dt))
+            noise *= _weight(flight)
+            out.append(((measured[:, None] - np.column_stack([predicted, *added])) / noise[:, None],
+                        rows + [term.row for term in own]))
     return out + _engine_residuals(flight, parameters)
 
 
@@ -123,8 +131,13 @@ def _engine_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple
             found[1:, j] = lfilter([s], [1.0, s - 1.0], wanted[1:], zi=[(1.0 - s) * power[j]])[0]
         left = (flight.controls[f"power_{side}"][:, None] - found) / full[:, None]
         # the chart between lever and power is nobody's claim: a constant share and an offset are taken out
-        out.append((_without_line(left, lever) / POWER_NOISE, rows))
+        out.append((_without_line(left, lever) / (POWER_NOISE * _weight(flight)), rows))
     return out
+
+
+def _weight(flight: Reconstruction) -> float:
+    """By which noise is multiplied so that samples count as if they were CORRELATED apart."""
+    return float(np.sqrt(max(CORRELATED / flight.dt, 1.0)))
 
 
 def _without_line(left: FloatArray, lever: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ System Identification, 2nd ed., chapter 7; gain with correlated noises: Anderson
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,11 +56,12 @@ class Predictor:
 
     def place(self, k: int) -> None:
         """Start every row at the measured state of sample `k` (a quarter of a second averaged)."""
-        start_state(self.flight, slice(k, k + max(2, round(0.25 / self.flight.dt))), self.fleet)
+        put(self.fleet, typical_state(self.flight, slice(k, k + max(2, round(0.25 / self.flight.dt)))))
 
-    def place_typical(self) -> None:
-        """Put every row at the record's median state: the condition about which the plant is linearised."""
-        start_state(self.flight, slice(None), self.fleet)
+    def place_in(self, spans: Sequence[slice], each: int) -> None:
+        """Put `each` rows after another at the typical state of each span of the record."""
+        values = [typical_state(self.flight, span) for span in spans]
+        put(self.fleet, {name: np.repeat([v[name] for v in values], each) for name in values[0]})
 
     def fly(self, steps: int, first: int | NDArray[np.intp] = 0, gain: FloatArray | None = None,
             pushes: tuple[Push, ...] = ()) -> FloatArray:
@@ -135,12 +136,12 @@ def held(parameters: NDArray, dt: float) -> NDArray:
     return out
 
 
-def start_state(flight: Reconstruction, span: slice, fleet: Fleet) -> None:
-    """Put every row at the measured state of the samples in `span`: their median, their mean where they are few."""
+def typical_state(flight: Reconstruction, span: slice) -> dict[str, float]:
+    """State of the samples in `span`, as `put` takes it: their median, their mean where they are few."""
     typical = np.median if span == slice(None) else np.mean
     mean = {name: float(typical(flight.channel(name)[span])) for name in MEASURED[:8]}
     mean |= {name: float(typical(series[span])) for name, series in flight.controls.items()}
-    put(fleet, mean | {"altitude": float(typical(flight.altitude[span]))})
+    return mean | {"altitude": float(typical(flight.altitude[span]))}
 
 
 def put(fleet: Fleet, values: Mapping[str, float | FloatArray]) -> None:

@@ -8,7 +8,7 @@ lost.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,8 +18,9 @@ from scipy.special import logsumexp
 from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.attribution import Hypothesis, Posterior, normalised
-from sim2real.candidates import NUISANCE_STEP, Bank, pushes
+from sim2real.candidates import NUISANCE_STEP, Bank, Term, pushes
 from sim2real.evidence import Evidence, compare, predicted
+from sim2real.form import gain, room, split, terms_of
 from sim2real.generic import fit_unknown
 from sim2real.predictor import innovations
 from sim2real.reconstruct import Reconstruction
@@ -29,6 +30,7 @@ from sim2real.sizes import in_powers
 
 LEADING, LIKELY = 3, 0.02  # explanations that are flown again, and how probable they have to be
 CERTAIN = 0.05  # probability of no gap above which nothing is: sizes near zero have no likelihood of Gaussian shape
+MOST = 8  # explanations flown again before the best need not be one of them
 ROUNDS = 2
 SETTLED = 0.2  # gain of half the whitened square that is worth another round
 FARTHEST = 6.0  # standard deviations of a nuisance
@@ -60,55 +62,81 @@ def leading(posterior: Posterior) -> list[Hypothesis]:
 
 
 def refine(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
-           centres: dict[int, FloatArray], posterior: Posterior) -> Posterior:
-    """The posterior with its leading explanations fitted where they lie.
+           start: Callable[[Hypothesis], FloatArray], posterior: Posterior) -> Posterior:
+    """The posterior with its leading explanations fitted where they lie, until the best of them has been flown.
 
     Args:
         flights: the records about the baseline.
         evidences: as gathered, for their gains and whitening.
-        centres: best nuisances [n] of each leading hypothesis, by its place in `posterior.hypotheses`.
+        start: best nuisances [n] of a hypothesis as far as the linear fit knows.
     """
-    found, points = list(posterior.hypotheses), {}
-    for i, centre in centres.items():
-        point = _settle(flights, candidates, evidences, baseline, posterior.tempering, found[i].fit, centre)
-        found[i] = _corrected(found[i], point, posterior)
-        points[i] = point
-    best = max(points, key=lambda i: found[i].log_prior + found[i].log_evidence)
-    for j, other in enumerate(found):
-        if other.unknown is not None and other.effects == found[best].effects:
-            found[j] = _beside(flights, candidates, evidences, baseline, posterior.tempering, found[best], points[best],
-                               other)
+    found: list[Hypothesis] = list(posterior.hypotheses)
+    points: dict[int, Point] = {}
+    waiting = [found.index(h) for h in leading(posterior)]
+    while waiting and len(points) < MOST:
+        for i in waiting:
+            at = start(found[i])
+            points[i] = _settle(flights, candidates, evidences, baseline, posterior.tempering, found[i].fit, at)
+            found[i] = _corrected(found[i], points[i], posterior)
+            if found[i].effects:
+                own = tuple(terms_of(found[i].fit, posterior.reduced, candidates.terms))
+                left = _left_over(flights, candidates, evidences, baseline, posterior.tempering, found[i].fit,
+                                  points[i], own)
+                found[i] = replace(found[i], form=gain(left[1:, 1:], left[1:, 0],
+                                                       room(found[i].fit, posterior.reduced, own)))
+        best = max((i for i, h in enumerate(found) if h.unknown is None), key=lambda i: found[i].log_posterior)
+        waiting = [] if best in points else [best]
+    best = max(points, key=lambda i: found[i].log_posterior)
+    beside = [j for j, h in enumerate(found) if h.unknown is not None and h.effects == found[best].effects]
+    if beside:
+        left = _left_over(flights, candidates, evidences, baseline, posterior.tempering, found[best].fit, points[best],
+                          candidates.terms)
+        form, others = _beside(candidates, posterior, left, found[best], [found[j] for j in beside])
+        found[best] = replace(found[best], form=max(found[best].form, form))
+        found = [h for j, h in enumerate(found) if j not in beside] + others
     return replace(posterior, hypotheses=normalised(found))
 
 
-def _beside(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
-            tempering: float, known: Hypothesis, point: Point, other: Hypothesis) -> Hypothesis:
-    """The unknown beside a set (or alone), judged on what the set leaves over where it was flown."""
+def _left_over(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
+               tempering: float, fit: SetFit, point: Point, terms: Sequence[Term]) -> FloatArray:
+    """Inner products of what a set leaves where it was flown (row 0) and generic terms, all else integrated out."""
     k, n = len(point.sizes), len(point.nuisances)
-    first, count = 1 + k + n, len(candidates.terms)
-    steps = _steps(known.fit, point.sizes)
+    first, count = 1 + k + n, len(terms)
+    steps = _steps(fit, point.sizes)
+    moved = tuple(replace(term, row=first + j) for j, term in enumerate(terms))
+    own = replace(candidates, terms=moved)
     gram = np.zeros((first + count, first + count))
     for flight, evidence in zip(flights, evidences, strict=True):
-        rows = _rows(flight, candidates, known.fit, point.sizes, steps, point.nuisances)
+        rows = _rows(flight, candidates, fit, point.sizes, steps, point.nuisances)
         base = innovations(replace(flight, parameters=rows[:1]), rows[:1], evidence.gain.K)[:, 0]
-        pushed = tuple(replace(q, row=first + j) for j, q in enumerate(
-            pushes(replace(flight, measured=predicted(flight, base)), candidates)))
+        pushed = pushes(replace(flight, measured=predicted(flight, base)), own)
         rows = np.concatenate([rows, np.repeat(rows[:1], count)])
-        gram += compare(flight, rows, pushed, evidence.gain, evidence.factor).gram / tempering
+        gram += compare(flight, rows, pushed, evidence.gain, evidence.factor, moved).gram / tempering
     gram[first - n : first, first - n : first] += baseline.precision
     gram[first - n : first, 0] += baseline.precision @ point.nuisances
     gram[0, first - n : first] = gram[first - n : first, 0]
     gram[0, 0] += point.nuisances @ baseline.precision @ point.nuisances
-    own = np.arange(1, first)
-    inner = gram[np.ix_(own, own)] + 1e-2 * np.diag(np.arange(first - 1) < k)
-    reduced = gram - gram[:, own] @ np.linalg.solve(inner, gram[own])
-    moved = replace(candidates, terms=tuple(replace(t, row=first + j) for j, t in enumerate(candidates.terms)))
-    fits = fit_unknown(reduced, moved)
+    gone = np.arange(1, first)
+    inner = gram[np.ix_(gone, gone)] + 1e-2 * np.diag(np.arange(first - 1) < k)
+    reduced = gram - gram[:, gone] @ np.linalg.solve(inner, gram[gone])
+    kept = np.concatenate([[0], np.arange(first, first + count)])
+    return np.asarray(reduced[np.ix_(kept, kept)])
+
+
+def _beside(candidates: Bank, posterior: Posterior, left: FloatArray, known: Hypothesis,
+            others: Sequence[Hypothesis]) -> tuple[float, list[Hypothesis]]:
+    """The unknown beside a set (or alone), judged on what it leaves where it was flown, and its form's evidence."""
+    moved = tuple(replace(term, row=1 + j) for j, term in enumerate(candidates.terms))
+    form, fits = 0.0, fit_unknown(left, replace(candidates, terms=moved))
+    if known.effects:
+        form, fits = split(known.fit, posterior.reduced, fits)
+    if not fits:
+        return form, []
     best = max(fits, key=lambda u: u.log_evidence)
-    gain = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
-    weights = {t.row: best.weights[first + j] for j, t in enumerate(candidates.terms) if first + j in best.weights}
-    return replace(other, fit=known.fit, unknown=replace(best, weights=weights),
-                   log_evidence=known.log_evidence + gain)  # fmt: skip
+    add = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
+    weights = {t.row: best.weights[1 + j] for j, t in enumerate(candidates.terms) if 1 + j in best.weights}
+    return form, [replace(other, fit=known.fit, unknown=replace(best, weights=weights),
+                          log_evidence=known.log_evidence + add) for other in others]  # fmt: skip
 
 
 def _settle(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,

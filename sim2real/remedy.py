@@ -80,7 +80,7 @@ def remedy(explained: Hypothesis | None, description: Description | None) -> Rem
     if explained is None:
         return Remedy()
     values, parts = values_of(explained.fit), [explained.fit.covariance]
-    if explained.unknown is not None and description is not None:
+    if explained.unknown is not None and description is not None and description.values:
         values["discrepancy"] = description.values
         parts.append(description.covariance)
     known = [p for p in parts if p is not None]

