@@ -17,7 +17,7 @@ from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
 from sim2real.candidates import NUISANCE_STEP, Bank
-from sim2real.form import gain, room, split, terms_of, without
+from sim2real.form import gain, room, shares, split, terms_of, without
 from sim2real.generic import UnknownFit, beside, fit_unknown
 from sim2real.sets import INTEGRATED, SetFit, grow, integrate, pairs
 from sim2real.singles import EffectFit, ambiguity, fit_family
@@ -237,7 +237,7 @@ def _form(reduced: FloatArray, bank: Bank, fit: SetFit) -> float:
     for m, slope in enumerate(slopes):
         chosen[1 + m, list(slope)] = list(slope.values())
     chosen[range(first, len(chosen)), [term.row for term in terms]] = 1.0
-    return gain(*without(chosen @ reduced @ chosen.T, first), room(fit, reduced, terms))
+    return gain(*without(chosen @ reduced @ chosen.T, first), room(fit, reduced, terms), shares(fit))
 
 
 def _with_unknown(reduced: FloatArray, bank: Bank, known: Hypothesis,

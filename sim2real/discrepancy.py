@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.attribution import Hypothesis, Posterior, nuisance_mean, reduce, with_prior
-from sim2real.candidates import DEVIATION, GENERIC, GENERIC_SIZE, Bank, Nuisance, shifted, unit_of
+from sim2real.candidates import Bank, Nuisance, shifted
 from sim2real.channels import SURFACES, TOLERANCE
 from sim2real.evidence import Evidence, compare
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.sets import SetFit
 from sim2real.singles import DETECTABLE
+from sim2real.terms import DEVIATION, GENERIC, GENERIC_SIZE, unit_of
 from sim2real.weigh import nearer
 
 SHOWN = DETECTABLE  # standard errors that a term has to stand out

@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icing_env.record import FloatArray
-from sim2real.candidates import Bank, Term, parameter_rows, pushes
+from sim2real.candidates import Bank, parameter_rows
 from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR
 from sim2real.kalman import Gain, follow, gains
 from sim2real.paths import CORRELATED, path_residuals
 from sim2real.predictor import Push, held, innovations
 from sim2real.reconstruct import Reconstruction
+from sim2real.terms import Term, pushes
 
 SIGMAS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.55, 0.67, 0.82, 1.0, 1.2, 1.45, 1.75, 2.1, 2.6, 3.2)  # m/s
 SETTLE = 4.0  # s, until the predictor has forgotten how it was started
@@ -63,7 +64,7 @@ def gather(flight: Reconstruction, bank: Bank, gain: Gain | None = None) -> Evid
         gain = follow(flight, choose_gain(flight, gains(flight, SIGMAS)))
     base = innovations(flight, flight.parameters, gain.K)[:, 0]
     factor = whitening(base, gain, flight)
-    pushed = pushes(replace(flight, measured=predicted(flight, base)), bank)
+    pushed = pushes(replace(flight, measured=predicted(flight, base)), bank.terms)
     return compare(flight, parameter_rows(flight, bank), pushed, gain, factor, bank.terms)
 
 

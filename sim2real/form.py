@@ -17,12 +17,12 @@ from scipy.special import logsumexp
 
 from icing_env import effects
 from icing_env.record import FloatArray
-from sim2real.candidates import Term
 from sim2real.generic import UnknownFit
 from sim2real.sets import SetFit
+from sim2real.terms import Term
 
 OTHER_FORM = 0.5  # prior probability that an effect has not the library's form (assumed)
-SHARES = (0.1, 0.3, 0.7)  # rho, equally likely then (assumed)
+SHARES = (0.1, 0.3, 0.7)  # rho, equally likely then; the last for single effects only (assumed)
 # Share of its signature by which no simulation of a large effect is right, wherever that shows (assumed).
 LEAK = 0.04
 LEAST = 3.0  # whitened size of a set's signature below which its form does not matter
@@ -84,21 +84,28 @@ def without(gram: FloatArray, first: int) -> tuple[FloatArray, FloatArray]:
     return inner, onto
 
 
-def gain(inner: FloatArray, onto: FloatArray, square: tuple[FloatArray, FloatArray]) -> float:
+def shares(fit: SetFit) -> tuple[float, ...]:
+    """rho that a set may have: several effects with large remainders at home could be anything."""
+    return SHARES if len(fit.families) == 1 else SHARES[:-1]
+
+
+def gain(inner: FloatArray, onto: FloatArray, square: tuple[FloatArray, FloatArray],
+         rho: Sequence[float] = SHARES) -> float:
     """Log evidence that another form adds to a set, averaged over its prior.
 
     Args:
         inner: inner products of the terms [m, m], nuisances and sizes integrated out.
         onto: of the terms with what the set leaves over [m].
         square: of `room`, two of [m].
+        rho: of `shares`.
     """
     used = np.flatnonzero((np.diag(inner) > 1e-9) & (square[0] + square[1] > 0.0))
     if not len(used):
         return 0.0
     logs = []
-    for share, leak in product((0.0, *SHARES), (0.0, 1.0)):
+    for share, leak in product((0.0, *rho), (0.0, 1.0)):
         room_each = share**2 * square[0][used] + leak * square[1][used]
-        prior = 0.5 * (OTHER_FORM / len(SHARES) if share else 1.0 - OTHER_FORM)
+        prior = 0.5 * (OTHER_FORM / len(rho) if share else 1.0 - OTHER_FORM)
         size = np.sqrt(room_each / np.diag(inner)[used])
         whole = np.eye(len(used)) + inner[np.ix_(used, used)] * size[:, None] * size
         along = onto[used] * size
@@ -112,7 +119,7 @@ def is_own(fit: SetFit, reduced: FloatArray, unknown: UnknownFit) -> bool:
     """Whether what generic terms take beside a set is another form of its effects, by place and by size."""
     taken = fit.misfit - unknown.misfit
     at_home = any(unknown.component in _places(name) for name in fit.effects)
-    return at_home and taken <= max(SHARES) ** 2 * _explained(fit, reduced)
+    return at_home and taken <= max(shares(fit)) ** 2 * _explained(fit, reduced)
 
 
 def split(fit: SetFit, reduced: FloatArray, fits: Sequence[UnknownFit]) -> tuple[float, list[UnknownFit]]:

@@ -19,9 +19,9 @@ from icing_env.atmosphere import pressure
 from icing_env.jit import entry
 from icing_env.propulsion import power_available
 from icing_env.record import FloatArray
-from sim2real.candidates import Term, path_course
 from sim2real.channels import SURFACES
 from sim2real.reconstruct import Reconstruction
+from sim2real.terms import Term, path_course
 
 POSITION_NOISE = 5.2e-4  # rad, the least believed (0.03 deg)
 TIMING = 0.002  # s: command and position are no better in step, nor is the actuator exactly of first order (assumed)

@@ -18,15 +18,16 @@ from scipy.special import logsumexp
 from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.attribution import Hypothesis, Posterior, normalised
-from sim2real.candidates import NUISANCE_STEP, Bank, Term, pushes
+from sim2real.candidates import NUISANCE_STEP, Bank
 from sim2real.evidence import Evidence, compare, predicted
-from sim2real.form import gain, room, split, terms_of
+from sim2real.form import gain, room, shares, split, terms_of
 from sim2real.generic import fit_unknown
 from sim2real.predictor import innovations
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.sets import Modes, SetFit, integrate
 from sim2real.sizes import in_powers
+from sim2real.terms import Term, pushes
 
 LEADING, LIKELY = 3, 0.02  # explanations that are flown again, and how probable they have to be
 CERTAIN = 0.05  # probability of no gap above which nothing is: sizes near zero have no likelihood of Gaussian shape
@@ -82,8 +83,8 @@ def refine(flights: Sequence[Reconstruction], candidates: Bank, evidences: Seque
                 own = tuple(terms_of(found[i].fit, posterior.reduced, candidates.terms))
                 left = _left_over(flights, candidates, evidences, baseline, posterior.tempering, found[i].fit,
                                   points[i], own)
-                found[i] = replace(found[i], form=gain(left[1:, 1:], left[1:, 0],
-                                                       room(found[i].fit, posterior.reduced, own)))
+                square = room(found[i].fit, posterior.reduced, own)
+                found[i] = replace(found[i], form=gain(left[1:, 1:], left[1:, 0], square, shares(found[i].fit)))
         best = max((i for i, h in enumerate(found) if h.unknown is None), key=lambda i: found[i].log_posterior)
         waiting = [] if best in points else [best]
     best = max(points, key=lambda i: found[i].log_posterior)
@@ -104,12 +105,11 @@ def _left_over(flights: Sequence[Reconstruction], candidates: Bank, evidences: S
     first, count = 1 + k + n, len(terms)
     steps = _steps(fit, point.sizes)
     moved = tuple(replace(term, row=first + j) for j, term in enumerate(terms))
-    own = replace(candidates, terms=moved)
     gram = np.zeros((first + count, first + count))
     for flight, evidence in zip(flights, evidences, strict=True):
         rows = _rows(flight, candidates, fit, point.sizes, steps, point.nuisances)
         base = innovations(replace(flight, parameters=rows[:1]), rows[:1], evidence.gain.K)[:, 0]
-        pushed = pushes(replace(flight, measured=predicted(flight, base)), own)
+        pushed = pushes(replace(flight, measured=predicted(flight, base)), moved)
         rows = np.concatenate([rows, np.repeat(rows[:1], count)])
         gram += compare(flight, rows, pushed, evidence.gain, evidence.factor, moved).gram / tempering
     gram[first - n : first, first - n : first] += baseline.precision

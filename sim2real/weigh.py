@@ -18,6 +18,7 @@ from sim2real.refine import leading, refine
 
 SETTLING, SETTLED = 4, 3.0  # steps towards the best nuisances, and the whitened length of a step that ends them
 RELINEARISE = 8.0  # whitened distance of the fitted nuisances beyond which all is flown again about them
+FIRST_ORDER = 3.0  # least tempering where another simulator's accelerations stand in for its flight (assumed)
 FARTHEST = 4.0  # standard deviations: what is beyond is no nuisance
 Progress = Callable[[str], None]
 
@@ -140,7 +141,8 @@ def temper(misfit: float, evidences: Sequence[Evidence]) -> float:
     excess = max(misfit / samples - 1.0, 0.0)
     whole = max(float(np.sum([np.sum(e.whitened**2) for e in evidences])) / samples - 1.0, excess, 1e-9)
     coloured = float(np.mean([correlation_time(e.whitened) for e in evidences])) - 1.0
-    return 1.0 + excess * (1.0 + coloured * excess / whole)
+    least = FIRST_ORDER if any(e.flight.known is not None for e in evidences) else 1.0
+    return least + excess * (1.0 + coloured * excess / whole)
 
 
 def correlation_time(series: FloatArray) -> float:

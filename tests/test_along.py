@@ -48,12 +48,13 @@ def test_free_flight_is_the_simulators(flight: Reconstruction, rows: int) -> Non
 
 def test_a_row_flies_alone_as_in_a_batch(flight: Reconstruction) -> None:
     """To the bit, with feedback and with pushes."""
-    from sim2real.candidates import bank, parameter_rows, pushes
+    from sim2real.candidates import bank, parameter_rows
     from sim2real.kalman import gains
     from sim2real.predictor import innovations
+    from sim2real.terms import pushes
 
     gain, candidates = gains(flight, (0.5,))[0].with_start(), bank()
-    rows, pushed = parameter_rows(flight, candidates), pushes(flight, candidates)
+    rows, pushed = parameter_rows(flight, candidates), pushes(flight, candidates.terms)
     together = innovations(flight, rows, gain.K, pushed)
     for row in (0, 7, 100, candidates.terms[20].row):
         own = tuple(type(q)(0, q.target, q.series, q.sensor) for q in pushed if q.row == row)

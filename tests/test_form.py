@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from icing_env import effects
-from sim2real.candidates import BEYOND, GENERIC, bank, unit_of
+from sim2real.candidates import bank
 from sim2real.form import ALIKE, OTHER_FORM, SHARES, gain, own_terms, without
 from sim2real.generic import fit_unknown
+from sim2real.terms import BEYOND, GENERIC, unit_of
 
 TERMS = 6
 

@@ -1,0 +1,183 @@
+"""Generic discrepancies: what a force, a moment, a sensor or a path may do that no effect of the library does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from icing_env.atmosphere import density
+from icing_env.record import FloatArray
+from sim2real.channels import MEASURED, SURFACES, TOLERANCE
+from sim2real.predictor import Push
+from sim2real.reconstruct import Reconstruction
+
+
+@dataclass(frozen=True)
+class Term:
+    """A generic discrepancy: `target` (force, moment or sensor component) with a time course made of the record."""
+
+    component: str
+    name: str
+    target: str
+    row: int
+
+
+# Generic discrepancies: component, what they act on, time courses ("1" constant, products of deviations, "time").
+GENERIC: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+    ("x_force", "u", ("1", "alpha", "alpha*alpha", "airspeed", "elevator", "time")),
+    ("z_force", "w", ("1", "alpha", "q", "elevator", "alpha*alpha", "airspeed", "time")),
+    ("pitching_moment", "q", ("1", "alpha", "q", "elevator", "alpha*alpha", "alpha*elevator", "airspeed", "time")),
+    ("y_force", "v", ("1", "beta", "p", "r", "rudder", "alpha*beta", "time")),
+    ("rolling_moment", "p", ("1", "beta", "p", "r", "aileron", "rudder", "alpha*beta", "time")),
+    ("yawing_moment", "r", ("1", "beta", "p", "r", "aileron", "rudder", "alpha*beta", "time")),
+    *((f"sensor:{c}", c, ("1", c, f"{c}_dot", "time")) for c in MEASURED[:8]),
+    *((f"sensor:{c}", c, ("1", c, "time")) for c in MEASURED[8:12]),
+)
+# Terms that the effect `discrepancy` cannot fly, and that show where a gap lies nevertheless: across axes, of higher
+# order, in the paths of surfaces (no lags: actuators have their own, and channels are in step to a few ms at best) and
+# in the engines.
+BEYOND: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+    ("x_force", "u", ("beta*beta", "rudder*rudder")),
+    ("z_force", "w", ("beta*beta", "alpha*alpha*alpha")),
+    ("pitching_moment", "q", ("beta*beta", "alpha*alpha*alpha", "aileron", "p", "r", "power")),
+    ("y_force", "v", ("aileron", "alpha*p", "alpha*rudder")),
+    ("rolling_moment", "p", ("alpha", "q", "alpha*p", "aileron*aileron*aileron", "power")),
+    ("yawing_moment", "r", ("alpha", "q", "alpha*p", "alpha*aileron", "alpha*rudder", "power")),
+    ("sensor:airspeed", "airspeed", ("alpha", "beta")),
+    ("sensor:alpha", "alpha", ("airspeed", "q")), ("sensor:beta", "beta", ("alpha", "p", "r")),
+    ("sensor:p", "p", ("q", "r", "az")), ("sensor:q", "q", ("p", "r", "az")), ("sensor:r", "r", ("p", "q", "az")),
+    ("sensor:phi", "phi", ("slow_phi", "slow_ay")), ("sensor:theta", "theta", ("slow_theta", "slow_ax")),
+    ("sensor:ax", "ax", ("q_dot", "alpha")), ("sensor:ay", "ay", ("p_dot", "r_dot")),
+    ("sensor:az", "az", ("q", "q_dot")),
+    *((f"{s}_path", f"{s}_path", ("1", "position", "acceleration", "position*position*position", "direction",
+                                  "airspeed", flow)) for s, flow in zip(SURFACES, ("alpha", "p", "beta"), strict=True)),
+    ("propulsion", "thrust", ("both", "both*airspeed", "left", "left*airspeed")),
+)  # fmt: skip
+# One standard deviation of a generic coefficient with a time course of unit size (assumed: a quarter of the change
+# that typical effects of the library make).
+GENERIC_SIZE = {"u": 0.008, "w": 0.03, "v": 0.01, "p": 0.002, "q": 0.015, "r": 0.002}
+PATH_SIZE = {"1": 0.5 * math.pi / 180.0, "position": 0.1, "acceleration": 0.0025,
+             "position*position*position": 0.1, "direction": 0.25 * math.pi / 180.0}  # rad, 1, s2, 1, rad (assumed)
+THRUST_SIZE = {"both": 0.1, "both*airspeed": 0.1, "left": 0.1, "left*airspeed": 0.1}  # (assumed)
+DEVIATION = {"alpha": 0.05, "beta": 0.05, "q": 0.1, "p": 0.2, "r": 0.1, "elevator": 0.04, "aileron": 0.08,
+             "rudder": 0.05, "airspeed": 5.0, "power": 0.2, "phi": 0.2, "theta": 0.1, "ax": 1.0, "ay": 1.0, "az": 2.0,
+             "p_dot": 1.0, "q_dot": 0.5, "r_dot": 0.3}  # fmt: skip  # what counts as one unit of a regressor (assumed)
+ERECTION = 30.0  # s in which a vertical gyro follows a false vertical (assumed)
+
+
+def pushes(flight: Reconstruction, terms: Sequence[Term]) -> tuple[Push, ...]:
+    """The time courses of the generic terms along one record."""
+    scale = _scales(flight)
+    out: list[Push] = []
+    for term in terms:
+        if term.target == "thrust":
+            out += _thrust_pushes(flight, term)
+        elif term.component.startswith("sensor:"):
+            out.append(Push(term.row, term.target, _sensor_course(flight, term.name, term.target), True))
+        elif not term.target.endswith("_path"):
+            series = GENERIC_SIZE[term.target] * scale[term.target] * _course(flight, term.name)
+            out.append(Push(term.row, term.target, series, False))
+    return tuple(out)
+
+
+def _thrust_pushes(flight: Reconstruction, term: Term) -> list[Push]:
+    """A share of both engines' thrust or of the left one's: felt, and read where recorded."""
+    p, sides = flight.parameters[0], ("left", "right") if term.name.startswith("both") else ("left",)
+    speed = flight.channel("airspeed")
+    per_power = p["propeller_efficiency"] / np.sqrt(speed**2 + p["propeller_static_speed"] ** 2)
+    out = []
+    for side in sides:
+        thrust = flight.controls[f"power_{side}"] * per_power
+        series = THRUST_SIZE[term.name] * thrust
+        if term.name.endswith("*airspeed"):
+            series = series * (speed - np.median(speed)) / DEVIATION["airspeed"]
+        yaw = p["engine_arm_y"] / p["inertia_zz"] * (1.0 if side == "left" else -1.0)
+        out += [Push(term.row, "u", series / p["mass"], False), Push(term.row, "r", yaw * series, False),
+                Push(term.row, "q", p["engine_arm_z"] / p["inertia_yy"] * series, False),
+                Push(term.row, f"thrust_{side}", series, True)]
+    return out
+
+
+def path_course(flight: Reconstruction, position: FloatArray, name: str) -> FloatArray:
+    """What a generic term adds to a surface's predicted position [rad]; loads push it by what the air does."""
+    rate = np.gradient(position, flight.dt)
+    reach = max(float(np.max(np.abs(position))), 1e-3)
+    course = {"1": np.ones(len(position)), "position": position, "acceleration": np.gradient(rate, flight.dt),
+              "position*position*position": position**3 / reach**2, "direction": np.tanh(rate / 0.02)}  # fmt: skip
+    return PATH_SIZE[name] * course[name] if name in course else PATH_SIZE["1"] * _course(flight, name)
+
+
+def _course(flight: Reconstruction, name: str) -> FloatArray:
+    """Product of the deviations named, in units of DEVIATION; a ramp from -1 to 1 for time."""
+    n = len(flight.time)
+    if name == "1":
+        return np.ones(n)
+    if name == "time":
+        return np.linspace(-1.0, 1.0, n)
+    out = np.ones(n)
+    for factor in name.split("*"):
+        values = _values(flight, factor)
+        out = out * (values - np.median(values)) / DEVIATION[factor]
+    return out
+
+
+def _values(flight: Reconstruction, factor: str) -> FloatArray:
+    """A regressor: a control, both engines' power over its mean, a channel, or its derivative from the past."""
+    if factor == "power":
+        both = flight.controls["power_left"] + flight.controls["power_right"]
+        return np.asarray(both / max(float(np.mean(both)), 1.0))
+    if factor in flight.controls:
+        return flight.controls[factor]
+    if factor.endswith("_dot"):
+        values = flight.channel(factor.removesuffix("_dot"))
+        return np.diff(values, prepend=values[:1]) / flight.dt
+    return flight.channel(factor)
+
+
+def _sensor_course(flight: Reconstruction, name: str, channel: str) -> FloatArray:
+    """Bias of one tolerance, scale error of 10 %, a lag of 0.1 s, or a drift over the record."""
+    tolerance = TOLERANCE[channel]
+    if name in ("1", "time"):
+        return tolerance * _course(flight, name)
+    if name.startswith("slow_"):
+        course, share = _course(flight, name.removeprefix("slow_")), flight.dt / ERECTION
+        return np.asarray(tolerance * lfilter([share], [1.0, share - 1.0], course))
+    if name.removesuffix("_dot") != channel:
+        return tolerance * _course(flight, name)
+    values = flight.channel(channel)
+    if name.endswith("_dot"):
+        return -0.1 * np.diff(values, prepend=values[:1]) / flight.dt  # backward: nothing of the sample to come
+    return 0.1 * (values - (0.0 if channel in ("alpha", "beta", "p", "q", "r") else np.median(values)))
+
+
+def unit_of(term: str, component: str) -> float:
+    """What a generic coefficient of one stands for: of a force's or moment's coefficient, or a reading, per regressor.
+
+    Deviations are in the units of their channels, power in shares of its mean.
+    """
+    if component.endswith("_path"):
+        return PATH_SIZE[term] if term in PATH_SIZE else PATH_SIZE["1"] / DEVIATION[term]
+    if component == "propulsion":
+        return THRUST_SIZE[term] / (DEVIATION["airspeed"] if term.endswith("*airspeed") else 1.0)
+    target = next(target for where, target, _ in GENERIC if where == component)
+    if component.startswith("sensor:"):
+        if term not in ("1", "time") and term.removesuffix("_dot") == target:
+            return 0.1
+        return TOLERANCE[target] / DEVIATION.get(term.removeprefix("slow_"), 1.0)
+    size = GENERIC_SIZE[target]
+    for factor in term.split("*"):
+        size /= DEVIATION.get(factor, 1.0)
+    return size
+
+
+def _scales(flight: Reconstruction) -> dict[str, float]:
+    """Acceleration per unit coefficient [m/s2, rad/s2] at the record's median condition."""
+    p = flight.parameters[0]
+    rho = density(float(np.median(flight.altitude)))
+    qs = 0.5 * rho * float(np.median(flight.channel("airspeed"))) ** 2 * p["wing_area"]
+    return {"u": qs / p["mass"], "v": qs / p["mass"], "w": qs / p["mass"], "p": qs * p["span"] / p["inertia_xx"],
+            "q": qs * p["chord"] / p["inertia_yy"], "r": qs * p["span"] / p["inertia_zz"]}  # fmt: skip
