@@ -24,6 +24,7 @@ from testbed.report import Report
 
 KIND = {"no_gap": "good", "explained": "caution", "unknown": "bad"}
 OVERLAID = ("airspeed", "alpha", "q", "theta", "ax", "az", "beta", "p", "r", "phi", "ay")
+FEW = 3  # effects named of those that one cannot be told from
 
 
 def write_report(found: Diagnosis, result: Mapping[str, Any], folder: Path) -> Path:
@@ -58,7 +59,7 @@ def _explanations(report: Report, result: Mapping[str, Any]) -> None:
     for effect in result["effects"]:
         for name, p in effect["parameters"].items():
             rows.append([effect["name"], effect["probability"], name, p["estimate"], p["low95"], p["high95"], p["unit"],
-                         ", ".join(effect["indistinguishable_from"]) or None])
+                         _listed(effect["indistinguishable_from"])])
     if rows:
         report.table(["effect", "probability", "parameter", "estimate", "low 95 %", "high 95 %", "unit",
                       "cannot be told from"], rows, "Effects that these records leave possible.")
@@ -67,6 +68,12 @@ def _explanations(report: Report, result: Mapping[str, Any]) -> None:
         report.table(["term", "coefficient", "standard error"],
                      [[t["term"], t["coefficient"], t["std_error"]] for t in unknown["terms"]],
                      f"What the library lacks, as terms of {unknown['component']} ({unknown['kind']}).")
+
+
+def _listed(names: list[str]) -> str | None:
+    """A few names, and how many more: an effect too small to be seen is like every other."""
+    more = len(names) - FEW
+    return ", ".join(names[:FEW]) + (f" and {more} more" if more > 0 else "") or None
 
 
 def _where(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:
