@@ -35,17 +35,19 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
     centre, known = settle(flights, candidates, baseline)
     progress(f"flying {candidates.size} variants along {len(flights)} records")
     evidences = gather_about(flights, candidates, centre, known)
-    posterior = weigh(evidences, candidates, dict(untestable), baseline, centre)
+    quiet = dict(untestable)
+    posterior = weigh(evidences, candidates, quiet, baseline, centre)
     gram = with_prior(total(evidences) / posterior.tempering, candidates, baseline.precision, centre)
     step = nearer(centre + nuisance_mean(gram, candidates, posterior.best.weights), candidates) - centre
     if _length(gram, step) > RELINEARISE:
         centre = centre + step
         progress("flying the variants again about the fitted model")
-        evidences = gather_about(flights, candidates, centre)
-    posterior = weigh(evidences, candidates, untestable, baseline, centre)
+        evidences, quiet = gather_about(flights, candidates, centre), dict(untestable)
+        posterior = weigh(evidences, candidates, quiet, baseline, centre)
+        gram = with_prior(total(evidences) / posterior.tempering, candidates, baseline.precision, centre)
+    untestable |= quiet
     if leading(posterior):
         progress("flying the leading explanations where they were fitted")
-        gram = with_prior(total(evidences) / posterior.tempering, candidates, baseline.precision, centre)
 
         def start(known: Hypothesis) -> FloatArray:
             return np.clip(centre + nuisance_mean(gram, candidates, known.weights), -FARTHEST, FARTHEST)
