@@ -83,6 +83,15 @@ def fly(flight: Reconstruction, manoeuvre: Manoeuvre) -> Reconstruction:
     Raises:
         InputError: the aircraft cannot fly steadily at that speed.
     """
+    return flown(*asked(flight, manoeuvre))
+
+
+def asked(flight: Reconstruction, manoeuvre: Manoeuvre) -> tuple[Reconstruction, dict[str, float]]:
+    """A record that holds nothing but the controls of a manoeuvre, and the trimmed state that it starts from.
+
+    Raises:
+        InputError: the aircraft cannot fly steadily at that speed.
+    """
     height = float(np.median(flight.altitude))
     state = trim(flight.parameters, airspeed=manoeuvre.airspeed, altitude=height)
     time = np.arange(0.0, DURATION, flight.dt)
@@ -96,19 +105,24 @@ def fly(flight: Reconstruction, manoeuvre: Manoeuvre) -> Reconstruction:
             controls[name] = controls[name] + step * shape
     for name in ("power_left", "power_right"):
         controls[name] = np.maximum(controls[name] * (1.0 + manoeuvre.power_ramp * time), 0.0)
-    made = replace(flight, known=None, time=time, measured=np.zeros((len(time), len(MEASURED))), controls=controls,
-                   altitude=np.full(len(time), height))
-    flown = Predictor(made, flight.parameters)
-    at = {"airspeed": manoeuvre.airspeed, "alpha": state.alpha, "beta": state.beta, "p": 0.0, "q": 0.0, "r": 0.0,
-          "phi": state.phi, "theta": state.theta, "altitude": height}
-    put(flown.fleet, at | {n: float(v[0]) for n, v in controls.items()})
-    measured = np.empty_like(made.measured)
-    measured[0] = flown.read()
-    measured[1:] = flown.fly(len(time) - 1)[:, 0]
     absent: NDArray[np.bool_] = np.array([not flight.has(name) for name in MEASURED])
-    measured[:, absent] = np.nan
+    made = replace(flight, known=None, time=time, measured=np.where(absent, np.nan, np.zeros((len(time), 1))),
+                   controls=controls, altitude=np.full(len(time), height))
+    return made, {"airspeed": manoeuvre.airspeed, "alpha": state.alpha, "beta": state.beta, "p": 0.0, "q": 0.0,
+                  "r": 0.0, "phi": state.phi, "theta": state.theta, "altitude": height}
+
+
+def flown(made: Reconstruction, start: Mapping[str, float]) -> Reconstruction:
+    """The record filled with what the model does under its controls from a state, in the channels that it has."""
+    plant = Predictor(made, made.parameters)
+    put(plant.fleet, dict(start) | {n: float(v[0]) for n, v in made.controls.items()})
+    measured = np.empty_like(made.measured)
+    measured[0] = plant.read()
+    measured[1:] = plant.fly(len(made.time) - 1)[:, 0]
+    measured[:, [not made.has(name) for name in MEASURED]] = np.nan
+    has_altitude = made.has("altitude")
     return replace(made, measured=measured, altitude=measured[:, MEASURED.index("altitude")].copy()
-                   if not absent[MEASURED.index("altitude")] else made.altitude)
+                   if has_altitude else made.altitude)
 
 
 def distances(made: Reconstruction, bank: Bank, rivals: list[tuple[str, Mapping[str, float]]],

@@ -89,7 +89,7 @@ def _follow(command: Any, start: float, gear: Any, offset: Any, low: Any, high: 
 
 
 @entry
-def _full_power(altitude: Any, aircraft: Any) -> Any:
+def full_power(altitude: Any, aircraft: Any) -> Any:
     """Shaft power of one engine with its lever forward at each height [W]; `aircraft`: one PARAMETERS row."""
     out = np.empty(len(altitude))
     for k in range(len(altitude)):
@@ -116,7 +116,7 @@ def _engine_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple
     if flight.power_from != "torque":
         return []
     out = []
-    full = _full_power(flight.altitude, flight.parameters)
+    full = full_power(flight.altitude, flight.parameters)
     rows = _differing(parameters, ["spool_time"])
     share = 1.0 - np.exp(-flight.dt / parameters["spool_time"][rows])
     for side in ("left", "right"):

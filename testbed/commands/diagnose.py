@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from icing_env.errors import InputError
 from testbed.commands.common import own_effects, print_json, print_table, verb
+from testbed.planning import before_a_flight
 
 if TYPE_CHECKING:
     from icing_env.record import FlightRecord
@@ -16,12 +18,13 @@ if TYPE_CHECKING:
 
 EXAMPLE = """icing diagnose flown.csv --held-out other.csv --out out/diagnosis
 icing fly clear_air --seed 1 --effect elevator_power:change=-0.2 --out flown.csv
-icing fly clear_air --seed 2 --effect elevator_power:change=-0.2 --out other.csv"""
+icing fly clear_air --seed 2 --effect elevator_power:change=-0.2 --out other.csv
+icing diagnose --plan "elevator doublets at 55 m/s" --gusts 1.5"""
 RECORDS = click.Path(path_type=Path)
 
 
 @verb("diagnose", EXAMPLE)
-@click.argument("records", nargs=-1, required=True, metavar="RECORD...", type=RECORDS)
+@click.argument("records", nargs=-1, metavar="RECORD...", type=RECORDS)
 @click.option("--held-out", multiple=True, metavar="RECORD", type=RECORDS,
               help="Never fitted: how far the gap closes is measured on it. May be repeated.")  # fmt: skip
 @click.option("--reference", multiple=True, metavar="RECORD", type=RECORDS,
@@ -36,6 +39,7 @@ RECORDS = click.Path(path_type=Path)
 @click.option("--policies", is_flag=True,
               help="Also rank controllers by the simulator before and after, and on the aircraft as diagnosed.")
 @own_effects
+@before_a_flight
 def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tuple[Path, ...],
             without: tuple[str, ...], out: Path | None, ladder: bool, simulator: Path | None, policies: bool,
             as_json: bool, seed: int) -> None:
@@ -43,13 +47,15 @@ def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tu
 
     Records are .csv, .parquet or SIDPAC's .mat. Every effect of `icing effects` is tried, beside "no gap" and "nothing
     in the library"; effects that the records cannot tell apart are named together. Names and notes of files play no
-    part.
+    part. With --plan no RECORD is needed: it says what manoeuvres would reveal before they are flown.
     """
     from rich.console import Console
 
     from sim2real.diagnosis import diagnose
     from sim2real.rollout import from_file
 
+    if not records:
+        raise InputError("no RECORD to diagnose: give at least one, or a manoeuvre with --plan")
     with Console(stderr=True).status("reading the records") as status:
         own = None if simulator is None else from_file(simulator)
         found = diagnose(read_all(records), read_all(held_out), read_all(reference), without, seed, status.update,
