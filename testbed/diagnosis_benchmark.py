@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from icing_env.errors import InputError
+from testbed.rivals import RIVALS
 from testbed.withheld.draw import DEVELOPMENT_SEED
 from testbed.withheld.files import read_json, tampered, write_text
 from testbed.withheld.generate import generate
@@ -33,7 +34,7 @@ Progress = Callable[[str], None]
 
 
 def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Progress,
-            without: bool = False) -> dict[str, Any]:
+            without: bool = False, rivals: bool = False) -> dict[str, Any]:
     """Draw (or finish drawing) a set in `out`, diagnose every case, fly the answers again, score.
 
     Args:
@@ -43,19 +44,24 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
         workers: processes, for flights and diagnoses.
         progress: told what is being done.
         without: diagnose some single effects again, their own effect left out of the library.
+        rivals: let every rival (`testbed.rivals`) answer too, into `answers_NAME`; what stands there is scored anyway.
 
     Raises:
         InputError: `out` holds another set, or its files are not those of its manifest.
     """
     committed = _drawn(out, cases, seed, workers, progress)
-    _solve(out, "answers", dict.fromkeys(sorted(committed["cases"]), ()), workers, progress)
+    names = sorted(committed["cases"])
+    _solve(out, "answers", dict.fromkeys(names, ()), workers, progress)
+    for rival in RIVALS if rivals else ():
+        _solve(out, f"answers_{rival}", dict.fromkeys(names, (rival,)), workers, progress, solve_by)
     removed = removals(out / "keys") if without else {}
     if without:  # only now, the ordinary answers being in, does the solver's side learn an effect of any case
         write_text(out / "without.json", json.dumps(removed, indent=1))
-        _solve(out, "answers_without", {name: (effect,) for name, effect in removed.items()}, workers, progress)
+        _solve(out, "answers_without", {name: ((effect,),) for name, effect in removed.items()}, workers, progress)
     refly(out / "answers", out / "keys", out / "refly", workers, progress)
     progress("scoring")
-    found = score(out / "answers", out / "keys", out / "refly", out / "answers_without")
+    there = [out / f"answers_{rival}" for rival in RIVALS if (out / f"answers_{rival}").is_dir()]
+    found = score(out / "answers", out / "keys", out / "refly", out / "answers_without", *there)
     return found | {"set": "development" if seed is not None else "sealed",
                     "sources": committed["sources"]}  # fmt: skip
 
@@ -100,13 +106,15 @@ def removals(keys: Path) -> dict[str, str]:
     return {name: effect for (effect, _), (_, name) in sorted(found.items())}
 
 
-def _solve(out: Path, folder: str, jobs: dict[str, tuple[str, ...]], workers: int, progress: Progress) -> None:
-    """Answers to the cases of `jobs`, each with some effects left out of the library, into a folder of `out`."""
+def _solve(out: Path, folder: str, jobs: Mapping[str, tuple[Any, ...]], workers: int, progress: Progress,
+           solver: Callable[..., dict[str, Any]] | None = None) -> None:
+    """Answers to the cases of `jobs`, whose values the solver (`solve`) is told beside the records, into a folder."""
+    solver = solver or solve
     answers, names = out / folder, list(jobs)
     answers.mkdir(exist_ok=True)
     left = [name for name in names if not (answers / f"{name}.json").is_file()]
     with closed(out / "keys"), ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        running = {pool.submit(solve, out / "records" / name, jobs[name]): name for name in left}
+        running = {pool.submit(solver, out / "records" / name, *jobs[name]): name for name in left}
         for k, task in enumerate(as_completed(running), start=len(names) - len(left) + 1):
             write_text(answers / f"{running[task]}.json", json.dumps(task.result(), allow_nan=False))
             progress(f"{folder}: {k} of {len(names)}")
@@ -140,6 +148,18 @@ def solve(case: Path, without: tuple[str, ...] = ()) -> dict[str, Any]:
     except InputError as error:
         return {"error": str(error)}
     return found
+
+
+def solve_by(case: Path, rival: str) -> dict[str, Any]:
+    """A rival's answer to one case's records, in the same form; {"error": why} where a record is refused."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    from icing_env.record import read
+    from testbed.rivals.solve import diagnose
+
+    try:
+        return diagnose(rival, [read(path) for path in sorted(case.glob("*.csv"))[:DIAGNOSED]])
+    except InputError as error:
+        return {"error": str(error)}
 
 
 def enter_ledger(path: Path, found: dict[str, Any], out: Path) -> None:
@@ -179,4 +199,9 @@ def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[s
                      text(found["mismatched_form"]["top1_by_gust"][gust]), ""])
     rows += [[f"{tier}: right", text(entry["right"]), f"of {entry['cases']}", "", ""]
              for tier, entry in found["by_tier"].items()]
-    return [(f"diagnosis, {found['set']} set", headers, rows)]
+    compared = {"solver": found, **found["baselines"]}
+    shown = ("top1", "top3", "null_false_alarm", "where_f1", "ece", "log_score", "seconds_per_case")
+    beside = [[name.replace("_", " "), *(text(figures[column]) for column in shown)]
+              for name, figures in compared.items()]  # fmt: skip
+    return [(f"diagnosis, {found['set']} set", headers, rows),
+            ("beside others", {"": "left", **{c.replace("_", " "): "right" for c in shown}}, beside)]

@@ -39,10 +39,11 @@ icing benchmark diagnosis --jsbsim"""
 @click.option("--ledger", type=click.Path(path_type=Path, dir_okay=False),
               help="diagnosis: append a line on this run to that file.")
 @click.option("--without", is_flag=True, help="diagnosis: also each effect in turn left out of the library.")
+@click.option("--rivals", is_flag=True, help="diagnosis: diagnoses of other kinds answer too, as baselines.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="diagnosis: processes.")
 def command(name: str, quick: bool, weights: Path | None, figure: Path | None, encounters: int | None,
             only: str | None, cases: int | None, fresh_seed: bool, out: Path, ledger: Path | None, workers: int,
-            without: bool, jsbsim: bool, jsbsim_root: str | None, as_json: bool, seed: int) -> None:
+            without: bool, rivals: bool, jsbsim: bool, jsbsim_root: str | None, as_json: bool, seed: int) -> None:
     """Measure the testbed.
 
     `speed`: one aircraft and batches, with and without observer, one thread, beside JSBSim in the same run (if it is
@@ -67,7 +68,7 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
         _jsbsim(cases, seed, out / "jsbsim", workers, jsbsim_root, as_json)
         return
     if name == "diagnosis":
-        _diagnosis(quick, cases, None if fresh_seed else seed, out, ledger, workers, without, as_json)
+        _diagnosis(quick, cases, None if fresh_seed else seed, out, ledger, workers, without, rivals, as_json)
         return
     if name in ("real_flight", "policies"):
         _cases(name, only, as_json)
@@ -112,11 +113,11 @@ def _adaptation(quick: bool, as_json: bool) -> None:
 
 
 def _diagnosis(quick: bool, cases: int | None, seed: int | None, out: Path, ledger: Path | None, workers: int,
-               without: bool, as_json: bool) -> None:
+               without: bool, rivals: bool, as_json: bool) -> None:
     from testbed.diagnosis_benchmark import FULL, QUICK, enter_ledger, measure, tables
 
     found = measure(out, cases or (QUICK if quick else FULL), seed, workers, lambda what: click.echo(what, err=True),
-                    without)
+                    without, rivals)
     if ledger is not None:
         enter_ledger(ledger, found, out)
     if as_json:

@@ -1,9 +1,9 @@
 """Score answers of `icing diagnose --json` against the keys of a sealed set, with json and NumPy alone.
 
-`python score.py ANSWERS KEYS [REFLY [WITHOUT]]`: folders with one JSON file per case. REFLY is what `refly.py` writes
-(without it, closure is null and the solver's own stands under `closure_told_median`), WITHOUT answers to single effects
-with the true effect left out of the library. Figures of the interface, with bootstrap 95 % intervals over cases. What
-counts as right is said in docs/benchmark_diagnosis.md.
+`python score.py ANSWERS KEYS [REFLY [WITHOUT [RIVAL ...]]]`: folders of one JSON file a case. REFLY is what `refly.py`
+writes (without it closure is null, and the solver's own stands under `closure_told_median`), WITHOUT answers to single
+effects with the true effect left out of the library, RIVAL `answers_NAME` of another solver, a baseline. Bootstrap 95 %
+intervals are over cases. What counts as right is said in docs/benchmark_diagnosis.md.
 """
 
 from __future__ import annotations
@@ -168,8 +168,7 @@ def _unknown(cases: Sequence[Case], low: float, high: float) -> tuple[list[float
     if not chosen:
         return [], []
     nearest, farthest = min(c["none"] for c in chosen), max(c["none"] for c in chosen)
-    matched = [c["p_unknown"] for c in cases
-               if c["tier"] in ("single", "pair") and nearest <= c["none"] <= farthest]
+    matched = [c["p_unknown"] for c in cases if c["tier"] in ("single", "pair") and nearest <= c["none"] <= farthest]
     return [c["p_unknown"] for c in chosen], matched
 
 
@@ -206,9 +205,8 @@ def figures(cases: Sequence[Case]) -> dict[str, Any]:
     seconds = [c["seconds"] for c in cases if c["seconds"] is not None]
     return {
         "cases": len(cases), "failed": sum(c["failed"] for c in cases), "identifiable_singles": len(clear),
-        "top1": share([c["top1"] for c in clear]),
+        "top1": share([c["top1"] for c in clear]), "top3": share([c["top3"] or c["top1"] for c in clear]),
         "top1_by_gust": {f"{s:g}": share([c["top1"] for c in clear if c["sigma"] == s]) for s in (0.0, 0.5, 1.5)},
-        "top3": share([c["top3"] or c["top1"] for c in clear]),
         "null_false_alarm": share([c["alarm"] for c in nulls]),
         "pair_exact_set": share([c["exact"] for c in cases if c["tier"] == "pair"]),
         "unknown_auroc_5_to_8": auroc(*_unknown(cases, APART, 8.0)),
@@ -273,8 +271,8 @@ def by_tier(cases: Sequence[Case], without: Sequence[Case]) -> dict[str, Any]:
     return tiers
 
 
-def baselines(answers: Path, keys: Path) -> dict[str, Any]:
-    """What knowing nothing scores: the answers dealt to other cases, and "no gap" always."""
+def baselines(answers: Path, keys: Path, rivals: Sequence[Path]) -> dict[str, Any]:
+    """What knowing nothing scores: the answers dealt to other cases, and "no gap" always; and what each rival does."""
     both = [tuple(json.loads((folder / path.name).read_text()) for folder in (answers, keys))
             for path in sorted(answers.glob("*.json"))]
     told, true = zip(*(pair for pair in both if pair[1]["tier"] != "faults"), strict=True)
@@ -282,10 +280,12 @@ def baselines(answers: Path, keys: Path) -> dict[str, Any]:
     silent = {"verdict": "no_gap", "hypotheses": [{"effects": [], "unknown": False, "probability": 1.0}],
               "credible_set_95": [0], "effects": [], "where": {"components": {}}, "gap": {"held_out": {}}}
     return {"permuted_keys": figures([flat(told[i], key) for i, key in zip(dealt, true, strict=True)]),
-            "always_no_gap": figures([flat(silent, key) for key in true])}
+            "always_no_gap": figures([flat(silent, key) for key in true])} | {
+        f.name.removeprefix("answers_"): figures([c for c in load(f, keys) if c["tier"] != "faults"]) for f in rivals}
 
 
-def score(answers: Path, keys: Path, refly: Path | None = None, without: Path | None = None) -> dict[str, Any]:
+def score(answers: Path, keys: Path, refly: Path | None = None, without: Path | None = None,
+          *rivals: Path) -> dict[str, Any]:
     """Every figure of the interface, intervals, tiers, mismatched forms (nulls and unknown included) and baselines."""
     everything = load(answers, keys, refly)
     left_out = load(without, keys) if without is not None and without.is_dir() else []
@@ -293,7 +293,7 @@ def score(answers: Path, keys: Path, refly: Path | None = None, without: Path | 
     mismatched = [c for c in cases if c["tier"] in ("null", "unknown") or c["other"]]
     return {**figures(cases), "intervals95": intervals(cases), "by_tier": by_tier(everything, left_out),
             "mismatched_form": {**figures(mismatched), "intervals95": intervals(mismatched)},
-            "baselines": baselines(answers, keys)}  # fmt: skip
+            "baselines": baselines(answers, keys, rivals)}  # fmt: skip
 
 
 if __name__ == "__main__":
