@@ -27,6 +27,7 @@ from sim2real.reconstruct import Reconstruction
 from sim2real.weigh import FARTHEST, Progress
 
 STEP, SLOW = 0.02, ("altitude", "thrust_left", "thrust_right")  # s between samples; channels sampled every fifth
+UPSET = {"beta": 0.35, "phi": 1.2, "theta": 0.8}  # rad, beyond which nobody plans to fly (assumed)
 SETTLING = 2  # times that the best of the nuisances is flown
 _NAME = re.compile(r"(?P<kind>.+) (?P<word>at|from) (?P<speed>\d+(\.\d+)?) m/s")
 _LOWEST, _HIGHEST = 20.0, 110.0  # m/s, as of a scenario's start
@@ -90,18 +91,28 @@ def planned(empty: Reconstruction, manoeuvre: Manoeuvre) -> Reconstruction:
     """A manoeuvre as the model would fly it, asked for by commands that actuators and engines follow.
 
     Raises:
-        InputError: the aircraft cannot fly steadily at that speed and height, or departs.
+        InputError: the aircraft cannot fly steadily at that speed and height, or leaves the range of angles that is planned for.
     """
     try:
         made, start = asked(empty, manoeuvre)
     except InputError as why:
         raise InputError(f"'{manoeuvre.name}' cannot be flown: {why}") from None
     made = flown(_commanded(made), start)
-    if not np.isfinite(made.measured).all():
-        raise InputError(f"'{manoeuvre.name}' cannot be flown: the aircraft departs; make its amplitude smaller")
+    _check_flown(made, manoeuvre.name)
     slow = [MEASURED.index(name) for name in SLOW]
     made.measured[np.ix_(np.arange(len(made.time)) % 5 != 0, slow)] = np.nan
     return made
+
+
+def _check_flown(made: Reconstruction, name: str) -> None:
+    """Refuse flights far into a stall or an upset: small differences grow there, and would pass for what is revealed."""
+    row = made.parameters[0]
+    deep = float(row["alpha_stall"] + 0.5 * row["stall_width"])  # half of the flow separated
+    for channel, most in ({"alpha": deep} | UPSET).items():
+        worst = float(np.max(np.abs(made.measured[:, MEASURED.index(channel)])))
+        if not worst <= most:
+            raise InputError(f"'{name}' cannot be flown: {channel} reaches {worst:.2f} rad, {most:.2f} is the most; "
+                             "make its amplitude smaller")
 
 
 def _commanded(made: Reconstruction) -> Reconstruction:

@@ -188,6 +188,8 @@ def test_a_plan_that_cannot_be_is_told():
 @pytest.mark.parametrize(("arguments", "said"), [
     (["--plan", "elevator doublet"], "no manoeuvre 'elevator doublet'"),
     (["--plan", "elevator doublets at 100 m/s"], "cannot be flown"),
+    (["--plan", ELEVATOR, "--amplitude", "12"], "alpha reaches"),
+    (["--plan", LATERAL, "--amplitude", "12"], "make its amplitude smaller"),
     (["--plan", ELEVATOR, "--noise", "q"], "CHANNEL=VALUE"),
     (["--plan", ELEVATOR, "--without", "gremlins"], "no effect 'gremlins'"),
     (["--plan", ELEVATOR, "--gusts", "-1"], "--gusts"),
