@@ -91,7 +91,7 @@ def planned(empty: Reconstruction, manoeuvre: Manoeuvre) -> Reconstruction:
     """A manoeuvre as the model would fly it, asked for by commands that actuators and engines follow.
 
     Raises:
-        InputError: the aircraft cannot fly steadily at that speed and height, or leaves the range of angles that is planned for.
+        InputError: the aircraft cannot fly steadily at that speed and height, or is far into a stall or an upset.
     """
     try:
         made, start = asked(empty, manoeuvre)
@@ -105,7 +105,7 @@ def planned(empty: Reconstruction, manoeuvre: Manoeuvre) -> Reconstruction:
 
 
 def _check_flown(made: Reconstruction, name: str) -> None:
-    """Refuse flights far into a stall or an upset: small differences grow there, and would pass for what is revealed."""
+    """Refuse flights far into a stall or an upset: the smallest change grows there and would seem to be revealed."""
     row = made.parameters[0]
     deep = float(row["alpha_stall"] + 0.5 * row["stall_width"])  # half of the flow separated
     for channel, most in ({"alpha": deep} | UPSET).items():
