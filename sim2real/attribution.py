@@ -17,7 +17,7 @@ from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
 from sim2real.candidates import NUISANCE_STEP, Bank
-from sim2real.form import gain, room, shares, split, terms_of, without
+from sim2real.form import MOSTLY, OTHER_FORM, SHARES, Form, at_home, forgiven, gain, own_terms, room, split, without
 from sim2real.generic import UnknownFit, beside, fit_unknown
 from sim2real.sets import INTEGRATED, SetFit, grow, integrate, pairs
 from sim2real.singles import EffectFit, ambiguity, fit_family
@@ -33,14 +33,17 @@ KEPT = 1e-5  # sets of several effects less probable than this are dropped
 class Hypothesis:
     """One explanation: a set of effects (empty: none) and perhaps something unknown beside it.
 
-    `form`: log evidence that the set gains where its effects may have another form than the library's.
+    `form`: of its effects, where that may be another than the library's; `instead`: generic terms at home that say it
+    better than the library's; `regained`: log evidence gained by these, and by what is forgiven (see `sim2real.form`).
     """
 
     fit: SetFit
     unknown: UnknownFit | None
     log_prior: float
     log_evidence: float
-    form: float = 0.0
+    form: Form | None = None
+    instead: UnknownFit | None = None
+    regained: float = 0.0
     probability: float = 0.0
 
     @property
@@ -51,7 +54,14 @@ class Hypothesis:
     @property
     def log_posterior(self) -> float:
         """But for a constant."""
-        return self.log_prior + self.log_evidence + self.form
+        return self.log_prior + self.log_evidence + self.regained
+
+    @property
+    def left(self) -> float:
+        """Whitened square that it leaves over at best, other forms included."""
+        own = self.unknown.misfit if self.unknown else self.fit.misfit
+        forms = [] if self.form is None else [self.form.left]
+        return min([own, *forms, *([] if self.instead is None else [self.instead.misfit])])
 
     @property
     def weights(self) -> dict[int, float]:
@@ -151,31 +161,98 @@ def with_prior(gram: FloatArray, bank: Bank, precision: FloatArray, centre: Floa
     return out
 
 
-def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str],
-              precision: FloatArray | None = None) -> Posterior:
-    """Posterior over no gap, sets of effects, and the unknown alone or beside them."""
+def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision: FloatArray | None = None,
+              noise: float = np.inf) -> Posterior:
+    """Posterior over no gap, sets of effects, and the unknown alone or beside them.
+
+    Args:
+        gram: inner products of all records.
+        bank: what was flown.
+        untestable: effects left out.
+        precision: prior precision of the nuisances; identity if omitted.
+        noise: whitened square that noise alone would leave, if known to be less than the best explanation leaves.
+    """
     reduced = reduce(gram, bank, precision)
     by_family = {f: fit_family(reduced, f) for f in bank.families if f.effect.name not in untestable}
     names = list(dict.fromkeys(f.effect.name for f in by_family))
     alternatives = {n: [e for f, e in by_family.items() if f.effect.name == n] for n in names}
-    fits = {n: max(found, key=lambda e: e.log_evidence) for n, found in alternatives.items()}
+    fits = {n: _best(own) for n, own in alternatives.items()}
     found = [Hypothesis(SetFit(misfit=float(reduced[0, 0])), None, np.log(P_NONE), 0.0)]
     single = np.log((1.0 - P_NONE - P_UNKNOWN - P_PAIRS - P_TRIPLES - P_BESIDE) / max(len(names), 1))
     for name, own in alternatives.items():
-        log = float(logsumexp([e.log_evidence for e in own]) - np.log(len(own)))
+        parameters = len({e.family.parameter.name for e in own})  # of equal prior; pieces of a range share one
+        log = float(logsumexp([e.log_evidence for e in own]) - np.log(parameters))
         found.append(Hypothesis(_alone(fits[name]), None, single, log))
     found += _several(reduced, bank, [i for i, f in enumerate(bank.families) if f in by_family])
     found = [replace(h, form=_form(reduced, bank, h.fit)) if h.effects else h for h in found]
+    found, unknown_fits = homes(found, fit_unknown(reduced, bank), float(reduced[0, 0]))
+    least = min([h.left for h in found] + [u.misfit for u in unknown_fits] + [noise])
+    found = forgive(found, float(reduced[0, 0]), least)
     leading = sorted(found, key=lambda h: -h.log_posterior)[:BESIDE]
     if found[0] not in leading:
         leading.append(found[0])
-    unknown_fits = tuple(fit_unknown(reduced, bank))
     for known in leading:
         form, beside_it = _with_unknown(reduced, bank, known, unknown_fits)
-        found[found.index(known)] = replace(known, form=max(known.form, form))
+        found[found.index(known)] = replace(known, form=better(known.form, form))
         found += beside_it
-    kept = normalised(found)
+    kept = normalised(forgive(found, float(reduced[0, 0]), min(least, *(h.left for h in found))))
     return Posterior(kept, fits, unknown_fits, ambiguity(reduced, fits, _inclusion(kept)), reduced)
+
+
+def homes(found: Sequence[Hypothesis], alone: Sequence[UnknownFit],
+          nothing: float) -> tuple[list[Hypothesis], tuple[UnknownFit, ...]]:
+    """Generic terms where a single effect of the library says most of the same are that effect in another form.
+
+    Returns:
+        The hypotheses, the single ones with such terms; and the terms that are nobody's.
+    """
+    out, left = list(found), []
+    for u in alone:
+        told = nothing - u.misfit
+        near = [i for i, h in enumerate(out) if len(h.effects) == 1 and at_home(u.component, h.effects)
+                and told > 0.0 and nothing - h.fit.misfit > MOSTLY * told]
+        if not near:
+            left.append(u)
+            continue
+        i = min(near, key=lambda i: out[i].fit.misfit)
+        now = out[i].instead
+        out[i] = replace(out[i], instead=u if now is None or u.log_evidence > now.log_evidence else now)
+    return out, tuple(left)
+
+
+def _best(own: Sequence[EffectFit]) -> EffectFit:
+    """The likeliest parameter and piece of its range; the smallest size that would show is that of any piece."""
+    best = max(own, key=lambda e: e.log_evidence)
+    shown = [e.smallest for e in own if e.smallest is not None and e.family.parameter is best.family.parameter]
+    return replace(best, smallest=min(shown, key=lambda s: abs(s - best.family.parameter.neutral), default=None))
+
+
+def better(one: Form | None, other: Form | None) -> Form | None:
+    """The form with more evidence."""
+    return max((form for form in (one, other) if form is not None), key=lambda form: form.gained, default=None)
+
+
+def forgive(found: Sequence[Hypothesis], nothing: float, least: float) -> list[Hypothesis]:
+    """Hypotheses with what another form, and a remainder that is forgiven, regain.
+
+    Args:
+        nothing: whitened square that no explanation at all leaves.
+        least: what noise alone would leave.
+    """
+    return [replace(h, regained=_regained(h, nothing, least)) for h in found]
+
+
+def _regained(h: Hypothesis, nothing: float, least: float) -> float:
+    if h.unknown is not None:
+        return forgiven(h.left - least, nothing - h.left)
+    if h.form is None:
+        return 0.0
+    other = h.form.gained + forgiven(h.form.left - least, nothing - h.form.left)
+    if h.instead is not None:
+        left = h.instead.misfit
+        alone = h.instead.log_evidence - h.log_evidence + forgiven(left - least, nothing - left)
+        other = float(np.logaddexp(other, alone - np.log(len(SHARES))))
+    return float(np.logaddexp(np.log(1.0 - OTHER_FORM), np.log(OTHER_FORM) + other))
 
 
 def normalised(found: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
@@ -226,9 +303,9 @@ def _merged(fits: list[SetFit], log_prior: float) -> list[Hypothesis]:
     return [Hypothesis(fit, None, log_prior, fit.log_evidence) for fit in chosen.values()]
 
 
-def _form(reduced: FloatArray, bank: Bank, fit: SetFit) -> float:
-    """What another form of its effects adds to a set's evidence (see `sim2real.form`), its sizes free to give way."""
-    terms, slopes = terms_of(fit, reduced, bank.terms), _slopes(fit)
+def _form(reduced: FloatArray, bank: Bank, fit: SetFit) -> Form:
+    """A set in another form (see `sim2real.form`), its sizes free to give way."""
+    terms, slopes = own_terms(fit.effects, bank.terms), _slopes(fit)
     first = 1 + len(slopes)
     chosen = np.zeros((first + len(terms), len(reduced)))
     chosen[0, 0] = 1.0
@@ -237,13 +314,14 @@ def _form(reduced: FloatArray, bank: Bank, fit: SetFit) -> float:
     for m, slope in enumerate(slopes):
         chosen[1 + m, list(slope)] = list(slope.values())
     chosen[range(first, len(chosen)), [term.row for term in terms]] = 1.0
-    return gain(*without(chosen @ reduced @ chosen.T, first), room(fit, reduced, terms), shares(fit))
+    return gain(*without(chosen @ reduced @ chosen.T, first), room(fit, reduced, terms), fit.misfit)
 
 
 def _with_unknown(reduced: FloatArray, bank: Bank, known: Hypothesis,
-                  alone: Sequence[UnknownFit]) -> tuple[float, list[Hypothesis]]:
-    """An explanation with something unknown beside it (alone where it explains nothing), and its form's evidence."""
-    fits, form = list(alone), 0.0
+                  alone: Sequence[UnknownFit]) -> tuple[Form | None, list[Hypothesis]]:
+    """An explanation with something unknown beside it (alone where it explains nothing), and its form."""
+    fits: list[UnknownFit] = list(alone)
+    form: Form | None = None
     if known.effects:
         fits = fit_unknown(beside(reduced, bank, known.fit, _slopes(known.fit)), bank)
         form, fits = split(known.fit, reduced, fits)

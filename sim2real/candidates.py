@@ -24,7 +24,6 @@ from sim2real.terms import BEYOND, GENERIC, Term
 # The published sets of derivatives differ by about 5 % where they are well identified: the standard deviation of the
 # model's own uncertainty. A record's mass is known to about 1 % (assumed).
 SPREAD, MASS_SPREAD = 0.05, 0.01
-LAG_SPREAD = 0.02  # s, of an actuator's lag that nobody has measured (assumed)
 THRUST_SPREAD = 0.3  # of thrust that was not recorded and is balanced against the model's own drag (assumed)
 FILTER_SPREAD, VANE_SPREAD = 0.1, 0.005  # of the recording's cut-off, and s: channels are in step to a few ms (assumed)
 VANE_SCALE = 0.015  # of a flow vane's reading, upwash included (assumed)
@@ -61,12 +60,14 @@ def shifted(parameters: NDArray, directions: tuple[Nuisance, ...], sizes: FloatA
 
 @dataclass(frozen=True)
 class Family:
-    """One parameter of one effect, the others neutral: rows `first + i` at `nodes[i]`."""
+    """One parameter of one effect between `low` and `high`, the others neutral, flown in `rows` at `nodes`."""
 
     effect: Effect
     parameter: Parameter
     nodes: tuple[float, ...]
     rows: tuple[int, ...]
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -81,15 +82,13 @@ class Bank:
 
 
 def nuisances() -> tuple[Nuisance, ...]:
-    """Derivatives by `SPREAD`, mass, the actuators' lags, the vanes' scales, the timing of channels, guessed thrust."""
+    """Derivatives by `SPREAD`, mass, the vanes' scales, the timing of channels, guessed thrust."""
     derivatives = [Nuisance(name, name, SPREAD) for name in DERIVATIVE_NAMES]
-    # flown about a lag that has taken an effect's place, the two no longer look alike, and neither gives way
-    lags = [Nuisance(f"{s}_lag", f"{s}_lag", LAG_SPREAD, True, follows=False) for s in SURFACES]
     guessed = Nuisance("thrust", "thrust_factor_left+thrust_factor_right", THRUST_SPREAD, only="balance")
     timing = (Nuisance("filter_frequency", "filter_frequency", FILTER_SPREAD),
               Nuisance("vane_lag", "vane_lag", VANE_SPREAD, True))
     vanes = [Nuisance(f"scale_{c}", f"scale_{c}", VANE_SCALE, True, follows=False) for c in ("alpha", "beta")]
-    return (*derivatives, Nuisance("mass", "mass", MASS_SPREAD), *lags, guessed, *vanes, *timing)
+    return (*derivatives, Nuisance("mass", "mass", MASS_SPREAD), guessed, *vanes, *timing)
 
 
 def nodes(parameter: Parameter) -> tuple[float, ...]:
@@ -105,6 +104,25 @@ def nodes(parameter: Parameter) -> tuple[float, ...]:
     return tuple(sorted(found))
 
 
+# Sizes of effects whose signatures bend so much that one polynomial does not follow them: piece by piece.
+PIECES: dict[tuple[str, str], tuple[tuple[float, ...], ...]] = {
+    ("early_stall", "angle"): ((-0.03, 0.03, 0.06), (0.06, 0.07, 0.08), (0.08, 0.09, 0.1), (0.1, 0.115, 0.13),
+                               (0.13, 0.14, 0.15)),
+    ("elevator_rate_limit", "reduction"): ((0.2, 0.4, 0.6), (0.6, 0.75, 0.85), (0.85, 0.92, 0.98)),
+    **{(f"{surface}_lag", "extra"): ((-0.04, 0.06, 0.12), (0.12, 0.2, 0.3), (0.3, 0.4, 0.5)) for surface in SURFACES},
+    ("vane_lag", "extra"): ((-0.02, 0.03, 0.08), (0.08, 0.14, 0.22), (0.22, 0.35, 0.5)),
+}
+
+
+def _pieces(effect: Effect, parameter: Parameter) -> list[tuple[tuple[float, ...], float, float]]:
+    """Nodes and ends of every piece of a parameter's range."""
+    parts = PIECES.get((effect.name, parameter.name))
+    if parts is None:
+        return [(nodes(parameter), parameter.low, parameter.high)]
+    ends = [parameter.low, *(part[-1] for part in parts[:-1]), parameter.high]
+    return [(part, low, high) for part, low, high in zip(parts, ends, ends[1:], strict=False)]
+
+
 def bank(without: Iterable[str] = ()) -> Bank:
     """The candidates of the whole library less `without`."""
     noise, families, terms = nuisances(), [], []
@@ -113,9 +131,9 @@ def bank(without: Iterable[str] = ()) -> Bank:
         if effect.name in without or effect.name == "turbulence":
             continue
         for parameter in effect.parameters:
-            sizes = nodes(parameter)
-            families.append(Family(effect, parameter, sizes, tuple(range(row, row + len(sizes)))))
-            row += len(sizes)
+            for sizes, low, high in _pieces(effect, parameter):
+                families.append(Family(effect, parameter, sizes, tuple(range(row, row + len(sizes))), low, high))
+                row += len(sizes)
     for component, target, names in (*GENERIC, *BEYOND):
         for name in names:
             terms.append(Term(component, name, target, row))

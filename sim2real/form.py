@@ -1,16 +1,18 @@
-"""A known effect in another form than the library's: what is left over where the effect enters is its own.
+"""A known effect in another form than the library's: what is left over is its own, as far as that is to be expected.
 
 Nobody's ice is a scaled derivative, and few actuators are of first order. A library effect that explains most of a gap
 leaves a remainder, the larger the larger the gap; judged by the noise alone, that remainder would be blamed on further
-effects. Each set is therefore also tried with generic terms at the components where its members enter, their expected
-square together a share rho^2 of the set's own signature (a discrepancy with a prior tied to the model: Brynjarsdottir
-& O'Hagan, Inverse Problems 30, 2014, 114007). What enters elsewhere, or is larger, is another effect or unknown.
+effects. Each set is therefore also tried in another form, with a prior tied to the set's own signature (a discrepancy:
+Brynjarsdottir & O'Hagan, Inverse Problems 30, 2014, 114007), of two kinds. Generic terms at the components where its
+members enter may take up to as much as these explain. What even these leave is weighed by a likelihood that grows with
+the logarithm of a large remainder (one of unknown scale in a few directions: integrating the variance out of a
+Gaussian's gives a Student's t), up to a share of what the set explains. What is larger is another effect or unknown.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import product
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import logsumexp
@@ -22,9 +24,10 @@ from sim2real.sets import SetFit
 from sim2real.terms import Term
 
 OTHER_FORM = 0.5  # prior probability that an effect has not the library's form (assumed)
-SHARES = (0.1, 0.3, 0.7)  # rho, equally likely then; the last for single effects only (assumed)
-# Share of its signature by which no simulation of a large effect is right, wherever that shows (assumed).
-LEAK = 0.04
+SHARES = (0.15, 0.4, 1.0)  # rho: what terms at home may take, over what the set explains; equally likely (assumed)
+FORGIVEN = 0.3  # of its signature, that a set may leave over anywhere for no reason that anybody could name (assumed)
+DIRECTIONS = 10.0  # in which such a remainder lies (assumed)
+MOSTLY = 0.5  # of what generic terms explain: an effect that explains more of it is what they are (assumed)
 LEAST = 3.0  # whitened size of a set's signature below which its form does not matter
 # Generic terms by which an effect that enters at a component may differ from the library's.
 ALIKE = {
@@ -35,15 +38,34 @@ ALIKE = {
 }
 
 
+@dataclass(frozen=True)
+class Form:
+    """A set in another form: log evidence that generic terms at home add, and the whitened square left after them."""
+
+    gained: float
+    left: float
+
+
+def forgiven(left: float, explained: float) -> float:
+    """Log evidence that a remainder regains where its scale is unknown.
+
+    Args:
+        left: whitened square above what noise leaves.
+        explained: whitened square explained.
+    """
+    most = min(max(left, 0.0), FORGIVEN**2 * max(explained, 0.0))
+    return float(0.5 * most - 0.5 * DIRECTIONS * np.log1p(most / DIRECTIONS))
+
+
 def own_terms(names: Iterable[str], terms: Sequence[Term]) -> list[Term]:
     """Generic terms at the components where any of the effects enters."""
     places = set().union(*(_places(name) for name in names))
     return [term for term in terms if term.component in places]
 
 
-def terms_of(fit: SetFit, reduced: FloatArray, terms: Sequence[Term]) -> list[Term]:
-    """Generic terms that a set's form is tried with: those of its members, all where it is large enough to leak."""
-    return list(terms) if LEAK * _explained(fit, reduced) ** 0.5 > 1.0 else own_terms(fit.effects, terms)
+def at_home(component: str, names: Iterable[str]) -> bool:
+    """Whether a component is one where any of the effects enters."""
+    return any(component in _places(name) for name in names)
 
 
 def _explained(fit: SetFit, reduced: FloatArray) -> float:
@@ -54,8 +76,8 @@ def _places(name: str) -> set[str]:
     return {c for at in effects.LIBRARY[name].enters_at for c in ALIKE.get(at, (at,))}
 
 
-def room(fit: SetFit, reduced: FloatArray, terms: Sequence[Term]) -> tuple[FloatArray, FloatArray]:
-    """Whitened square that each term may take where rho is one [terms], and what it may take whatever the form.
+def room(fit: SetFit, reduced: FloatArray, terms: Sequence[Term]) -> FloatArray:
+    """Whitened square that each term may take where rho is one [terms].
 
     Every member shares the square of its own signature (no more than the set explains) among the terms where it enters.
     """
@@ -68,7 +90,7 @@ def room(fit: SetFit, reduced: FloatArray, terms: Sequence[Term]) -> tuple[Float
         own = np.array([term.component in _places(family.effect.name) for term in terms])
         if energy > LEAST**2 and own.any():
             out += own * energy / np.count_nonzero(own)
-    return out, np.full(len(terms), LEAK**2 * explained / max(len(terms), 1))
+    return out
 
 
 def without(gram: FloatArray, first: int) -> tuple[FloatArray, FloatArray]:
@@ -84,46 +106,41 @@ def without(gram: FloatArray, first: int) -> tuple[FloatArray, FloatArray]:
     return inner, onto
 
 
-def shares(fit: SetFit) -> tuple[float, ...]:
-    """rho that a set may have: several effects with large remainders at home could be anything."""
-    return SHARES if len(fit.families) == 1 else SHARES[:-1]
-
-
-def gain(inner: FloatArray, onto: FloatArray, square: tuple[FloatArray, FloatArray],
-         rho: Sequence[float] = SHARES) -> float:
-    """Log evidence that another form adds to a set, averaged over its prior.
+def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float) -> Form:
+    """What generic terms at home add to a set, averaged over the prior of another form.
 
     Args:
         inner: inner products of the terms [m, m], nuisances and sizes integrated out.
         onto: of the terms with what the set leaves over [m].
-        square: of `room`, two of [m].
-        rho: of `shares`.
+        square: of `room` [m].
+        misfit: whitened square that the set leaves over.
     """
-    used = np.flatnonzero((np.diag(inner) > 1e-9) & (square[0] + square[1] > 0.0))
+    used = np.flatnonzero((np.diag(inner) > 1e-9) & (square > 0.0))
     if not len(used):
-        return 0.0
-    logs = []
-    for share, leak in product((0.0, *rho), (0.0, 1.0)):
-        room_each = share**2 * square[0][used] + leak * square[1][used]
-        prior = 0.5 * (OTHER_FORM / len(rho) if share else 1.0 - OTHER_FORM)
-        size = np.sqrt(room_each / np.diag(inner)[used])
-        whole = np.eye(len(used)) + inner[np.ix_(used, used)] * size[:, None] * size
+        return Form(0.0, misfit)
+    logs, taken = [0.0], [0.0]
+    for share in SHARES:
+        most = share**2 * square[used]
+        size = np.sqrt(most / np.diag(inner)[used])
+        scaled = inner[np.ix_(used, used)] * size[:, None] * size
         along = onto[used] * size
-        log = 0.5 * float(along @ np.linalg.solve(whole, along)) - 0.5 * float(np.linalg.slogdet(whole)[1])
-        most = 0.5 * float(room_each.sum())  # a Gaussian prior alone would not forbid a larger remainder
-        logs.append(min(log, most) + np.log(prior))
-    return float(logsumexp(logs))
+        at = np.linalg.solve(np.eye(len(used)) + scaled, along)
+        log = 0.5 * float(along @ at) - 0.5 * float(np.linalg.slogdet(np.eye(len(used)) + scaled)[1])
+        # a Gaussian prior alone would not forbid a larger remainder
+        logs.append(min(log, 0.5 * float(most.sum())))
+        taken.append(min(float(2.0 * at @ along - at @ scaled @ at), float(most.sum())))
+    return Form(float(logsumexp(logs)) - float(np.log(len(logs))), misfit - taken[int(np.argmax(logs))])
 
 
 def is_own(fit: SetFit, reduced: FloatArray, unknown: UnknownFit) -> bool:
     """Whether what generic terms take beside a set is another form of its effects, by place and by size."""
     taken = fit.misfit - unknown.misfit
-    at_home = any(unknown.component in _places(name) for name in fit.effects)
-    return at_home and taken <= max(shares(fit)) ** 2 * _explained(fit, reduced)
+    return at_home(unknown.component, fit.effects) and taken <= max(SHARES) ** 2 * _explained(fit, reduced)
 
 
-def split(fit: SetFit, reduced: FloatArray, fits: Sequence[UnknownFit]) -> tuple[float, list[UnknownFit]]:
-    """What a set gains where the best of generic fits beside it is its own form, and the fits that are not."""
+def split(fit: SetFit, reduced: FloatArray, fits: Sequence[UnknownFit]) -> tuple[Form | None, list[UnknownFit]]:
+    """A set's form where the best of the generic fits beside it is its own, and the fits that are not."""
     own = [u for u in fits if is_own(fit, reduced, u)]
-    gained = max((u.log_evidence for u in own), default=-np.inf) + np.log(OTHER_FORM / len(SHARES))
-    return float(gained), [u for u in fits if u not in own]
+    best = max(own, key=lambda u: u.log_evidence, default=None)
+    form = None if best is None else Form(best.log_evidence - float(np.log(len(SHARES))), best.misfit)
+    return form, [u for u in fits if u not in own]

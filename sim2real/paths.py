@@ -47,7 +47,8 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
             predicted = follow(flight.commands[name], measured[0], parameters[rows], surface, flight.dt)
             own = [term for term in terms if term.component == name.replace("command", "path")]
             added = [predicted[:, 0] + path_course(flight, predicted[:, 0], term.name) for term in own]
-            noise = np.hypot(max(POSITION_NOISE, _spread(measured)), TIMING * np.gradient(predicted[:, 0], flight.dt))
+            # of the record alone: what noise is believed must not depend on the row that stands first
+            noise = np.hypot(max(POSITION_NOISE, _spread(measured)), TIMING * np.gradient(measured, flight.dt))
             noise *= _weight(flight)
             out.append(((measured[:, None] - np.column_stack([predicted, *added])) / noise[:, None],
                         rows + [term.row for term in own]))

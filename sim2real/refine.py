@@ -8,7 +8,7 @@ lost.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,10 +17,10 @@ from scipy.special import logsumexp
 
 from icing_env import effects
 from icing_env.record import FloatArray
-from sim2real.attribution import Hypothesis, Posterior, normalised
+from sim2real.attribution import Hypothesis, Posterior, better, forgive, normalised
 from sim2real.candidates import NUISANCE_STEP, Bank
 from sim2real.evidence import Evidence, compare, predicted
-from sim2real.form import gain, room, shares, split, terms_of
+from sim2real.form import Form, gain, own_terms, room, split
 from sim2real.generic import fit_unknown
 from sim2real.predictor import innovations
 from sim2real.reconstruct import Reconstruction
@@ -32,7 +32,7 @@ from sim2real.terms import Term, pushes
 LEADING, LIKELY = 3, 0.02  # explanations that are flown again, and how probable they have to be
 CERTAIN = 0.05  # probability of no gap above which nothing is: sizes near zero have no likelihood of Gaussian shape
 MOST = 8  # explanations flown again before the best need not be one of them
-ROUNDS = 2
+ROUNDS = 4
 SETTLED = 0.2  # gain of half the whitened square that is worth another round
 FARTHEST = 6.0  # standard deviations of a nuisance
 
@@ -72,7 +72,10 @@ def refine(flights: Sequence[Reconstruction], candidates: Bank, evidences: Seque
         start: best nuisances [n] of a hypothesis as far as the linear fit knows.
     """
     found: list[Hypothesis] = list(posterior.hypotheses)
-    points: dict[int, Point] = {}
+    before, points = list(found), dict[int, Point]()
+    nothing, noise = float(posterior.reduced[0, 0]), np.inf
+    if posterior.tempering > 1.0:
+        noise = sum(e.samples for e in evidences) / posterior.tempering
     waiting = [found.index(h) for h in leading(posterior)]
     while waiting and len(points) < MOST:
         for i in waiting:
@@ -80,11 +83,12 @@ def refine(flights: Sequence[Reconstruction], candidates: Bank, evidences: Seque
             points[i] = _settle(flights, candidates, evidences, baseline, posterior.tempering, found[i].fit, at)
             found[i] = _corrected(found[i], points[i], posterior)
             if found[i].effects:
-                own = tuple(terms_of(found[i].fit, posterior.reduced, candidates.terms))
+                own = tuple(own_terms(found[i].effects, candidates.terms))
                 left = _left_over(flights, candidates, evidences, baseline, posterior.tempering, found[i].fit,
                                   points[i], own)
                 square = room(found[i].fit, posterior.reduced, own)
-                found[i] = replace(found[i], form=gain(left[1:, 1:], left[1:, 0], square, shares(found[i].fit)))
+                found[i] = replace(found[i], form=gain(left[1:, 1:], left[1:, 0], square, found[i].fit.misfit))
+        found = forgive(_inherited(found, before, points), nothing, _least(found, points, noise))
         best = max((i for i, h in enumerate(found) if h.unknown is None), key=lambda i: found[i].log_posterior)
         waiting = [] if best in points else [best]
     best = max(points, key=lambda i: found[i].log_posterior)
@@ -93,9 +97,39 @@ def refine(flights: Sequence[Reconstruction], candidates: Bank, evidences: Seque
         left = _left_over(flights, candidates, evidences, baseline, posterior.tempering, found[best].fit, points[best],
                           candidates.terms)
         form, others = _beside(candidates, posterior, left, found[best], [found[j] for j in beside])
-        found[best] = replace(found[best], form=max(found[best].form, form))
-        found = [h for j, h in enumerate(found) if j not in beside] + others
+        found[best] = replace(found[best], form=better(found[best].form, form))
+        least = min([_least(found, points, noise), *(h.left for h in others)])
+        found = forgive([h for j, h in enumerate(found) if j not in beside] + others, nothing, least)
     return replace(posterior, hypotheses=normalised(found))
+
+
+def _inherited(found: Sequence[Hypothesis], before: Sequence[Hypothesis], points: Iterable[int]) -> list[Hypothesis]:
+    """Sets that were not flown, corrected by as much as the largest flown set within them was.
+
+    What polynomials in its size miss of an effect they miss in every set that holds it; else the sets that nobody has
+    flown yet would always look best.
+    """
+    flown, out = [j for j in points if found[j].effects], list(found)
+    for i, h in enumerate(before):
+        within = [j for j in flown if set(before[j].effects) <= set(h.effects)]
+        if i in flown or not within:
+            continue
+        nearest = max(within, key=lambda j: len(before[j].effects))
+        now, then = found[nearest], before[nearest]
+        more = now.fit.misfit - then.fit.misfit
+        form, unknown = h.form, h.unknown
+        if form is not None and now.form is not None and then.form is not None:
+            form = Form(form.gained + now.form.gained - then.form.gained, form.left + now.form.left - then.form.left)
+        if unknown is not None:
+            unknown = replace(unknown, misfit=unknown.misfit + more)
+        out[i] = replace(h, fit=replace(h.fit, misfit=h.fit.misfit + more), form=form, unknown=unknown,
+                         log_evidence=h.log_evidence + now.log_evidence - then.log_evidence)
+    return out
+
+
+def _least(found: Sequence[Hypothesis], points: Iterable[int], noise: float) -> float:
+    """What noise alone would leave, as far as what was flown shows."""
+    return min([noise, *(found[i].left for i in points)])
 
 
 def _left_over(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
@@ -124,10 +158,11 @@ def _left_over(flights: Sequence[Reconstruction], candidates: Bank, evidences: S
 
 
 def _beside(candidates: Bank, posterior: Posterior, left: FloatArray, known: Hypothesis,
-            others: Sequence[Hypothesis]) -> tuple[float, list[Hypothesis]]:
-    """The unknown beside a set (or alone), judged on what it leaves where it was flown, and its form's evidence."""
+            others: Sequence[Hypothesis]) -> tuple[Form | None, list[Hypothesis]]:
+    """The unknown beside a set (or alone), judged on what it leaves where it was flown, and the set's form."""
     moved = tuple(replace(term, row=1 + j) for j, term in enumerate(candidates.terms))
-    form, fits = 0.0, fit_unknown(left, replace(candidates, terms=moved))
+    form: Form | None = None
+    fits = fit_unknown(left, replace(candidates, terms=moved))
     if known.effects:
         form, fits = split(known.fit, posterior.reduced, fits)
     if not fits:

@@ -10,7 +10,7 @@ from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
 from sim2real.candidates import Family
-from sim2real.sizes import size_prior
+from sim2real.sizes import piece_prior
 
 INDISTINGUISHABLE = 3.5  # whitened distance below which two explanations are told as one
 DETECTABLE = 3.5  # whitened distance from no gap at which an effect counts as shown
@@ -43,18 +43,18 @@ class EffectFit:
 
 def fit_family(reduced: FloatArray, family: Family) -> EffectFit:
     """Integrate one effect's size out."""
-    parameter, rows = family.parameter, [0, *family.rows]
+    rows = [0, *family.rows]
     block = reduced[np.ix_(rows, rows)]
-    coarse = np.linspace(parameter.low, parameter.high, GRID)
+    coarse = np.linspace(family.low, family.high, GRID)
     best = coarse[int(np.argmax(_log_likelihood(block, family, coarse)))]
     for _ in range(2):  # the likelihood may be far narrower than the range
         curvature = _information(block, family, best)
-        width = min(6.0 / np.sqrt(max(curvature, 1e-12)), parameter.high - parameter.low)
-        fine = np.clip(np.linspace(best - width, best + width, FINE), parameter.low, parameter.high)
+        width = min(6.0 / np.sqrt(max(curvature, 1e-12)), family.high - family.low)
+        fine = np.clip(np.linspace(best - width, best + width, FINE), family.low, family.high)
         best = fine[int(np.argmax(_log_likelihood(block, family, fine)))]
     grid = np.unique(np.concatenate([coarse, fine]))
     gain = _log_likelihood(block, family, grid) + 0.5 * reduced[0, 0]
-    prior = size_prior(parameter, grid)
+    prior = piece_prior(family, grid)
     step = np.gradient(grid)
     log_mass = gain + np.log(np.maximum(prior * step, 1e-300))
     total = float(logsumexp(log_mass))
@@ -80,8 +80,8 @@ def _log_likelihood(block: FloatArray, family: Family, size: FloatArray) -> Floa
 
 def _information(block: FloatArray, family: Family, size: float) -> float:
     """Square of the whitened signature per unit of size."""
-    span = family.parameter.high - family.parameter.low
-    ends = np.clip([size - 1e-3 * span, size + 1e-3 * span], family.parameter.low, family.parameter.high)
+    span = family.high - family.low
+    ends = np.clip([size - 1e-3 * span, size + 1e-3 * span], family.low, family.high)
     a, b = _weights(family, ends)
     change = (b - a) / (ends[1] - ends[0])
     return float(change @ block[1:, 1:] @ change)
@@ -97,6 +97,9 @@ def _smallest(reduced: FloatArray, family: Family) -> float | None:
     parameter = family.parameter
     end = parameter.high if (parameter.typical or 1.0) > parameter.neutral else parameter.low
     sizes = parameter.neutral + (end - parameter.neutral) * np.geomspace(1e-3, 1.0, 60)
+    sizes = sizes[(sizes >= family.low) & (sizes <= family.high)]  # of this piece of the range
+    if not len(sizes):
+        return None
     w = _weights(family, sizes)
     rows = list(family.rows)
     distance = np.sqrt(np.maximum(np.einsum("si,ij,sj->s", w, reduced[np.ix_(rows, rows)], w), 0.0))

@@ -12,7 +12,7 @@ from sim2real.candidates import Family
 
 OTHER_SIGN = 0.25  # prior share of sizes of the sign opposite to the typical one (assumed)
 WIDTH = 0.9  # standard deviation of log|s / typical| (assumed)
-TABLE = 1201  # points of a tabulated prior
+TABLE, FINEST = 1201, 4001  # points of a tabulated prior, and of one that is only summed
 
 
 def size_prior(parameter: Parameter, size: FloatArray) -> FloatArray:
@@ -28,6 +28,15 @@ def size_prior(parameter: Parameter, size: FloatArray) -> FloatArray:
     density = shape * np.where(np.sign(size - parameter.neutral) == sign, 1.0 - other, other)
     total = float(np.sum(density * np.gradient(size)))
     return np.asarray(density / total) if total > 0.0 else density
+
+
+def piece_prior(family: Family, size: FloatArray) -> FloatArray:
+    """The same where a family is one piece of the range: it integrates to the piece's share of the whole."""
+    p = family.parameter
+    whole = np.linspace(p.low, p.high, FINEST)
+    inside = (whole >= family.low) & (whole <= family.high)
+    share = float(np.sum((size_prior(p, whole) * np.gradient(whole))[inside]))
+    return np.asarray(size_prior(p, size) * share)
 
 
 @dataclass(frozen=True)
@@ -76,11 +85,11 @@ def in_powers(reduced: FloatArray, families: tuple[Family, ...]) -> Powers:
         powers = x[:, None] ** np.arange(1, len(x) + 1)  # signature(x_i) = sum_k x_i^k E_k
         first = 1 + m * degree
         change[first : first + len(x), list(family.rows)] = np.linalg.inv(powers)
-    low = np.array([(f.parameter.low - f.parameter.neutral) for f in families]) / reach
-    high = np.array([(f.parameter.high - f.parameter.neutral) for f in families]) / reach
+    low = np.array([(f.low - f.parameter.neutral) for f in families]) / reach
+    high = np.array([(f.high - f.parameter.neutral) for f in families]) / reach
     prior = np.empty((len(families), TABLE))
     for m, family in enumerate(families):
-        prior[m] = size_prior(family.parameter, neutral[m] + reach[m] * np.linspace(low[m], high[m], TABLE)) * reach[m]
+        prior[m] = piece_prior(family, neutral[m] + reach[m] * np.linspace(low[m], high[m], TABLE)) * reach[m]
     return Powers(families, change @ reduced @ change.T, degree, neutral, reach, low, high, prior)
 
 

@@ -53,19 +53,21 @@ BEYOND: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("sensor:phi", "phi", ("slow_phi", "slow_ay")), ("sensor:theta", "theta", ("slow_theta", "slow_ax")),
     ("sensor:ax", "ax", ("q_dot", "alpha")), ("sensor:ay", "ay", ("p_dot", "r_dot")),
     ("sensor:az", "az", ("q", "q_dot")),
-    *((f"{s}_path", f"{s}_path", ("1", "position", "acceleration", "position*position*position", "direction",
-                                  "airspeed", flow)) for s, flow in zip(SURFACES, ("alpha", "p", "beta"), strict=True)),
+    *((f"{s}_path", f"{s}_path", ("1", "position", "acceleration", "inertia", "position*position*position",
+                                  "direction", "airspeed", flow))
+      for s, flow in zip(SURFACES, ("alpha", "p", "beta"), strict=True)),
     ("propulsion", "thrust", ("both", "both*airspeed", "left", "left*airspeed")),
 )  # fmt: skip
 # One standard deviation of a generic coefficient with a time course of unit size (assumed: a quarter of the change
 # that typical effects of the library make).
 GENERIC_SIZE = {"u": 0.008, "w": 0.03, "v": 0.01, "p": 0.002, "q": 0.015, "r": 0.002}
-PATH_SIZE = {"1": 0.5 * math.pi / 180.0, "position": 0.1, "acceleration": 0.0025,
-             "position*position*position": 0.1, "direction": 0.25 * math.pi / 180.0}  # rad, 1, s2, 1, rad (assumed)
+PATH_SIZE = {"1": 0.5 * math.pi / 180.0, "position": 0.1, "acceleration": 0.0025, "inertia": 0.005,
+             "position*position*position": 0.1, "direction": 0.25 * math.pi / 180.0}  # rad, 1, s2, s2, 1, rad (assumed)
 THRUST_SIZE = {"both": 0.1, "both*airspeed": 0.1, "left": 0.1, "left*airspeed": 0.1}  # (assumed)
 DEVIATION = {"alpha": 0.05, "beta": 0.05, "q": 0.1, "p": 0.2, "r": 0.1, "elevator": 0.04, "aileron": 0.08,
              "rudder": 0.05, "airspeed": 5.0, "power": 0.2, "phi": 0.2, "theta": 0.1, "ax": 1.0, "ay": 1.0, "az": 2.0,
              "p_dot": 1.0, "q_dot": 0.5, "r_dot": 0.3}  # fmt: skip  # what counts as one unit of a regressor (assumed)
+SECOND_ORDER = 0.1  # s, by which an actuator of second order smooths what it lacks in acceleration (assumed)
 ERECTION = 30.0  # s in which a vertical gyro follows a false vertical (assumed)
 
 
@@ -106,7 +108,9 @@ def path_course(flight: Reconstruction, position: FloatArray, name: str) -> Floa
     """What a generic term adds to a surface's predicted position [rad]; loads push it by what the air does."""
     rate = np.gradient(position, flight.dt)
     reach = max(float(np.max(np.abs(position))), 1e-3)
-    course = {"1": np.ones(len(position)), "position": position, "acceleration": np.gradient(rate, flight.dt),
+    acceleration, share = np.gradient(rate, flight.dt), min(flight.dt / SECOND_ORDER, 1.0)
+    course = {"1": np.ones(len(position)), "position": position, "acceleration": acceleration,
+              "inertia": lfilter([share], [1.0, share - 1.0], acceleration),
               "position*position*position": position**3 / reach**2, "direction": np.tanh(rate / 0.02)}  # fmt: skip
     return PATH_SIZE[name] * course[name] if name in course else PATH_SIZE["1"] * _course(flight, name)
 

@@ -115,7 +115,8 @@ def weigh(evidences: Sequence[Evidence], candidates: Bank, untestable: dict[str,
 
     def posterior_of(tempering: float) -> Posterior:
         gram = with_prior(data / tempering, candidates, baseline.precision, centre)
-        return replace(attribute(gram, candidates, tuple(untestable), nothing), tempering=tempering)
+        noise = sum(e.samples for e in evidences) / tempering if tempering > 1.0 else np.inf
+        return replace(attribute(gram, candidates, tuple(untestable), nothing, noise), tempering=tempering)
 
     posterior = posterior_of(1.0)
     tempering = temper(posterior.least_misfit, evidences)

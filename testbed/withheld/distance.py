@@ -206,9 +206,3 @@ def paths(flown: Flown, level: float) -> NDArray:
         out.append(torque / sizes["torque_left"] / slow)
         out.append((flown.channels[f"thrust_{side}"] - power * per) / sizes["thrust_left"] / slow)
     return np.concatenate(out) / level
-
-
-def departures(flown: Flown, still: Flown) -> tuple[NDArray, NDArray]:
-    """What differs: channels of MOTION [samples, 12] and moved inputs [samples, 5]."""
-    y = np.column_stack([flown.channels[c] - still.channels[c] for c in MOTION])
-    return y, flown.states[:, list(INPUTS)] - still.states[:, list(INPUTS)]

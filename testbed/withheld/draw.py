@@ -21,9 +21,11 @@ SPREAD, MASS_RANGE = 0.05, 0.02
 SMALLEST, LARGEST = 0.7, 2.2  # of the typical size
 # Effects that must be larger for an ideal observer to name eight of them in 2,400 cases (`shares.py`): the spread of
 # derivatives or a near rival hides smaller ones.
-LARGER = {"static_stability": (2.28, 2.5), "rudder_power": (2.35, 2.5), "mass_error": (1.7, 2.5),
-          "air_density": (1.9, 2.5), "early_stall": (1.3, 2.5), "drag_due_to_lift": (1.7, 2.5),
-          "pitch_damping": (1.0, 2.5)}  # fmt: skip
+LARGER = {"static_stability": (2.5, 2.9), "rudder_power": (2.6, 3.1), "mass_error": (1.7, 2.5),
+          "air_density": (2.1, 2.7), "early_stall": (1.3, 2.5), "drag_due_to_lift": (1.7, 2.5),
+          "pitch_damping": (2.1, 2.7), "lift_slope": (2.3, 2.9), "elevator_power": (2.0, 2.7),
+          "roll_damping": (2.0, 2.6), "aileron_power": (1.25, 2.2), "dihedral_effect": (1.3, 2.2),
+          "tail_ice": (1.7, 2.5), "wing_ice": (1.4, 2.5)}  # fmt: skip
 MOST = {"elevator_rate_limit": 0.95}
 
 

@@ -20,6 +20,7 @@ from testbed.withheld.draw import MASS_RANGE, MOST, SPREAD
 from testbed.withheld.flights import Aircraft, Flown, fly
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
 from testbed.withheld.numbers import DERIVATIVES
+from testbed.withheld.shadow import shadow
 
 MASS_SPREAD = MASS_RANGE / 3**0.5  # of a uniform distribution
 NUISANCES = (*((name, 1.0 + SPREAD) for name in DERIVATIVES if name != "Cn_aileron"), ("mass", 1.0 + MASS_SPREAD))
@@ -43,17 +44,17 @@ class Bank:
 def bank(plan: int, gain: float) -> Bank:
     """Flown in still air by the published aircraft."""
     stills, motion, inputs, paths = [], [], [], []
+    changed = [Aircraft(baseline={name: factor}) for name, factor in NUISANCES]
+    rivals = [Aircraft(parts=((e.name, "same", min(size * e.typical, MOST.get(e.name, 9.0))),))
+              for e in effects.EFFECTS for size in SIZES]
     for manoeuvre in PLANS[plan][:DIAGNOSED]:
         still = fly(Aircraft(), manoeuvre, gain)
         own = distance.paths(still, 1.0)
-        columns = [fly(Aircraft(baseline={name: factor}), manoeuvre, gain) for name, factor in NUISANCES]
-        columns += [fly(Aircraft(parts=((e.name, "same", min(size * e.typical, MOST.get(e.name, 9.0))),)), manoeuvre,
-                        gain) for e in effects.EFFECTS for size in SIZES]
+        flown = [shadow(aircraft, still, manoeuvre.speed) for aircraft in (*changed, *rivals)]
         stills.append(still)
-        pairs = [distance.departures(flown, still) for flown in columns]
-        motion.append(np.stack([y for y, _ in pairs], axis=2))
-        inputs.append(np.stack([u for _, u in pairs], axis=2))
-        paths.append(np.column_stack([distance.paths(flown, 1.0) - own for flown in columns]))
+        motion.append(np.stack([y for y, _, _ in flown], axis=2))
+        inputs.append(np.stack([u for _, u, _ in flown], axis=2))
+        paths.append(np.column_stack([distance.paths(along, 1.0) - own for _, _, along in flown]))
     return Bank(stills, motion, inputs, paths)
 
 
@@ -101,10 +102,9 @@ def distances(plan: int, gain: float, g: Geometry, parts: Sequence[Part]) -> Dis
     total, cross, held = 0.0, np.zeros(len(g.gram)), bank(plan, gain)
     everything = zip(PLANS[plan], g.filters, g.starts, g.columns, held.still, strict=False)
     for manoeuvre, w, s, columns, still in everything:
-        flown = fly(Aircraft(parts=tuple(parts)), manoeuvre, gain)
-        y, u = distance.departures(flown, still)
+        y, u, along = shadow(Aircraft(parts=tuple(parts)), still, manoeuvre.speed)
         white = _clear(distance.whiten(w, y[:, :, None], u[:, :, None]), s)[:, 0]
-        column = np.concatenate([white, distance.paths(flown, g.level) - distance.paths(still, g.level)])
+        column = np.concatenate([white, distance.paths(along, g.level) - distance.paths(still, g.level)])
         total += float(column @ column)
         cross += columns.T @ column
     k = len(NUISANCES)
