@@ -34,7 +34,7 @@ CERTAIN = 0.05  # probability of no gap above which nothing is: sizes near zero 
 MOST = 8  # explanations flown again before the best need not be one of them
 ROUNDS = 4
 SETTLED = 0.2  # gain of half the whitened square that is worth another round
-FARTHEST = 6.0  # standard deviations of a nuisance
+FARTHEST = 15.0  # standard deviations of a nuisance: its prior counts, and what is beyond may not fly
 
 
 @dataclass(frozen=True)
@@ -176,12 +176,13 @@ def _beside(candidates: Bank, posterior: Posterior, left: FloatArray, known: Hyp
 
 def _settle(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
             tempering: float, fit: SetFit, centre: FloatArray) -> Point:
-    """Gauss-Newton from a set's linear fit; a step that does not help is halved."""
+    """Gauss-Newton from a set's linear fit, or the published model if that is nearer; a step that fails is halved."""
     def fly(sizes: FloatArray, nuisances: FloatArray) -> Point:
         return _point(flights, candidates, evidences, baseline, tempering, fit, sizes, nuisances)
 
     low, high = (np.array([getattr(f.parameter, end) for f in fit.families]) for end in ("low", "high"))
-    best, share = fly(np.array(fit.estimate), centre), 1.0
+    starts = [fly(np.array(fit.estimate), at) for at in (np.clip(centre, -FARTHEST, FARTHEST), np.zeros_like(centre))]
+    best, share = min(starts, key=lambda point: point.cost), 1.0
     for _ in range(ROUNDS):
         step = -share * np.linalg.solve(best.information, best.slope)
         if -0.5 * float(step @ best.slope) < SETTLED:

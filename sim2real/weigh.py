@@ -50,7 +50,7 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
         progress("flying the leading explanations where they were fitted")
 
         def start(known: Hypothesis) -> FloatArray:
-            return np.clip(centre + nuisance_mean(gram, candidates, known.weights), -FARTHEST, FARTHEST)
+            return centre + nuisance_mean(gram, candidates, known.weights)
 
         posterior = refine(flights, candidates, evidences, baseline, start, posterior)
     return evidences, posterior
