@@ -10,15 +10,16 @@ r(s) = v + sum a_i(s) D_i and nuisance signatures G ~ N(0, I):
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
 from sim2real.candidates import NUISANCE_STEP, Bank
-from sim2real.form import MOSTLY, OTHER_FORM, SHARES, Form, at_home, forgiven, gain, own_terms, room, split, without
+from sim2real.form import Form, gain, own_terms, room, split, without
 from sim2real.generic import UnknownFit, beside, fit_unknown
+from sim2real.hypotheses import Hypothesis, Posterior, better, forgive, homes, normalised
 from sim2real.sets import INTEGRATED, SetFit, grow, integrate, pairs
 from sim2real.singles import EffectFit, ambiguity, fit_family
 from sim2real.sizes import flown_weights, in_powers
@@ -26,103 +27,6 @@ from sim2real.sizes import flown_weights, in_powers
 # Prior (assumed): what is left is shared by single effects. A pair is about one per cent as likely as either member.
 P_NONE, P_UNKNOWN, P_PAIRS, P_TRIPLES, P_BESIDE = 0.5, 0.05, 0.07, 0.007, 0.007
 BESIDE = 6  # leading sets that something unknown is tried beside
-KEPT = 1e-5  # sets of several effects less probable than this are dropped
-
-
-@dataclass(frozen=True, eq=False)
-class Hypothesis:
-    """One explanation: a set of effects (empty: none) and perhaps something unknown beside it.
-
-    `form`: of its effects, where that may be another than the library's; `instead`: generic terms at home that say it
-    better than the library's; `regained`: log evidence gained by these, and by what is forgiven (see `sim2real.form`).
-    """
-
-    fit: SetFit
-    unknown: UnknownFit | None
-    log_prior: float
-    log_evidence: float
-    form: Form | None = None
-    instead: UnknownFit | None = None
-    regained: float = 0.0
-    probability: float = 0.0
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Names, in alphabetical order."""
-        return tuple(sorted(self.fit.effects))
-
-    @property
-    def log_posterior(self) -> float:
-        """But for a constant."""
-        return self.log_prior + self.log_evidence + self.regained
-
-    @property
-    def left(self) -> float:
-        """Whitened square that it leaves over at best, other forms included."""
-        own = self.unknown.misfit if self.unknown else self.fit.misfit
-        forms = [] if self.form is None else [self.form.left]
-        return min([own, *forms, *([] if self.instead is None else [self.instead.misfit])])
-
-    @property
-    def weights(self) -> dict[int, float]:
-        """Of the flown rows, beside the model's."""
-        return (self.fit.weights or {}) | (self.unknown.weights if self.unknown else {})
-
-
-@dataclass(frozen=True)
-class Posterior:
-    """Probabilities that sum to one, with the fits behind them.
-
-    Attributes:
-        hypotheses: the most probable first.
-        fits: every effect on its own.
-        unknown_fits: generic terms on their own, by component.
-        classes: effects that one effect cannot be told from.
-        reduced: inner products, nuisances integrated out.
-        tempering: what the evidence was divided by.
-    """
-
-    hypotheses: tuple[Hypothesis, ...]
-    fits: dict[str, EffectFit]
-    unknown_fits: tuple[UnknownFit, ...]
-    classes: dict[str, tuple[str, ...]]
-    reduced: FloatArray
-    tempering: float = 1.0
-
-    @property
-    def none(self) -> float:
-        """Probability of no gap."""
-        return sum(h.probability for h in self.hypotheses if not h.effects and h.unknown is None)
-
-    @property
-    def unknown(self) -> float:
-        """Probability that something is there which the library lacks, with or without known effects."""
-        return sum(h.probability for h in self.hypotheses if h.unknown is not None)
-
-    @property
-    def effects(self) -> dict[str, float]:
-        """Probability that each effect is there, alone or with others."""
-        found = dict.fromkeys(self.fits, 0.0)
-        for hypothesis in self.hypotheses:
-            for name in hypothesis.effects:
-                found[name] += hypothesis.probability
-        return found
-
-    @property
-    def best(self) -> Hypothesis:
-        """The most probable explanation."""
-        return self.hypotheses[0]
-
-    def leading(self, name: str) -> SetFit:
-        """The most probable set that holds an effect."""
-        return next(h.fit for h in self.hypotheses if name in h.effects)
-
-    @property
-    def least_misfit(self) -> float:
-        """Whitened square that the best of all explanations leaves over."""
-        return min([h.unknown.misfit if h.unknown else h.fit.misfit for h in self.hypotheses]
-                   + [u.misfit for u in self.unknown_fits])  # fmt: skip
-
 
 def reduce(gram: FloatArray, bank: Bank, precision: FloatArray | None = None) -> FloatArray:
     """Inner products after the nuisances are integrated out.
@@ -199,70 +103,11 @@ def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision
     return Posterior(kept, fits, unknown_fits, ambiguity(reduced, fits, _inclusion(kept)), reduced)
 
 
-def homes(found: Sequence[Hypothesis], alone: Sequence[UnknownFit],
-          nothing: float) -> tuple[list[Hypothesis], tuple[UnknownFit, ...]]:
-    """Generic terms where a single effect of the library says most of the same are that effect in another form.
-
-    Returns:
-        The hypotheses, the single ones with such terms; and the terms that are nobody's.
-    """
-    out, left = list(found), []
-    for u in alone:
-        told = nothing - u.misfit
-        near = [i for i, h in enumerate(out) if len(h.effects) == 1 and at_home(u.component, h.effects)
-                and told > 0.0 and nothing - h.fit.misfit > MOSTLY * told]
-        if not near:
-            left.append(u)
-            continue
-        i = min(near, key=lambda i: out[i].fit.misfit)
-        now = out[i].instead
-        out[i] = replace(out[i], instead=u if now is None or u.log_evidence > now.log_evidence else now)
-    return out, tuple(left)
-
-
 def _best(own: Sequence[EffectFit]) -> EffectFit:
     """The likeliest parameter and piece of its range; the smallest size that would show is that of any piece."""
     best = max(own, key=lambda e: e.log_evidence)
     shown = [e.smallest for e in own if e.smallest is not None and e.family.parameter is best.family.parameter]
     return replace(best, smallest=min(shown, key=lambda s: abs(s - best.family.parameter.neutral), default=None))
-
-
-def better(one: Form | None, other: Form | None) -> Form | None:
-    """The form with more evidence."""
-    return max((form for form in (one, other) if form is not None), key=lambda form: form.gained, default=None)
-
-
-def forgive(found: Sequence[Hypothesis], nothing: float, least: float) -> list[Hypothesis]:
-    """Hypotheses with what another form, and a remainder that is forgiven, regain.
-
-    Args:
-        nothing: whitened square that no explanation at all leaves.
-        least: what noise alone would leave.
-    """
-    return [replace(h, regained=_regained(h, nothing, least)) for h in found]
-
-
-def _regained(h: Hypothesis, nothing: float, least: float) -> float:
-    if h.unknown is not None:
-        return forgiven(h.left - least, nothing - h.left)
-    if h.form is None:
-        return 0.0
-    other = h.form.gained + forgiven(h.form.left - least, nothing - h.form.left)
-    if h.instead is not None:
-        left = h.instead.misfit
-        alone = h.instead.log_evidence - h.log_evidence + forgiven(left - least, nothing - left)
-        other = float(np.logaddexp(other, alone - np.log(len(SHARES))))
-    return float(np.logaddexp(np.log(1.0 - OTHER_FORM), np.log(OTHER_FORM) + other))
-
-
-def normalised(found: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
-    """Probabilities of hypotheses, sorted; sets of several that are next to impossible are dropped."""
-    logs = np.array([h.log_posterior for h in found])
-    share = np.exp(logs - logsumexp(logs))
-    keep = [i for i, h in enumerate(found) if share[i] > KEPT or (len(h.effects) < 2 and not (h.effects and h.unknown))]
-    total = float(share[keep].sum())
-    out = [replace(found[i], probability=float(share[i]) / total) for i in keep]
-    return tuple(sorted(out, key=lambda h: -h.probability))
 
 
 def _inclusion(found: Sequence[Hypothesis]) -> dict[str, float]:

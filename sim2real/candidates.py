@@ -8,7 +8,7 @@ Every candidate is one row of a batch; rows mean the same in every record, so th
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,6 +121,13 @@ def _pieces(effect: Effect, parameter: Parameter) -> list[tuple[tuple[float, ...
         return [(nodes(parameter), parameter.low, parameter.high)]
     ends = [parameter.low, *(part[-1] for part in parts[:-1]), parameter.high]
     return [(part, low, high) for part, low, high in zip(parts, ends, ends[1:], strict=False)]
+
+
+def unbroken(families: Iterable[Family]) -> list[Family]:
+    """One family for every parameter, over its whole range, without rows; nodes as if nothing bent."""
+    whole = {(f.effect.name, f.parameter.name): f for f in families}
+    return [replace(f, nodes=nodes(f.parameter), rows=(), low=f.parameter.low, high=f.parameter.high)
+            for f in whole.values()]
 
 
 def bank(without: Iterable[str] = ()) -> Bank:

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from icing_env import effects
 from icing_env.record import FloatArray
-from sim2real.attribution import Hypothesis, Posterior, nuisance_mean, reduce, with_prior
+from sim2real.attribution import nuisance_mean, reduce, with_prior
 from sim2real.candidates import Bank, Nuisance, shifted
 from sim2real.channels import SURFACES, TOLERANCE
 from sim2real.evidence import Evidence, compare
+from sim2real.hypotheses import Hypothesis, Posterior
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.sets import SetFit

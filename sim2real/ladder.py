@@ -16,11 +16,11 @@ import numpy as np
 
 from icing_env.record import FloatArray
 from sim2real import black_box, gap
-from sim2real.attribution import Hypothesis, Posterior
 from sim2real.candidates import Bank, not_testable
 from sim2real.channels import MEASURED
 from sim2real.discrepancy import describe_unknown
 from sim2real.evidence import Evidence
+from sim2real.hypotheses import Hypothesis, Posterior
 from sim2real.paths import driven
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline

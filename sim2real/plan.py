@@ -18,7 +18,7 @@ import numpy as np
 from icing_env import effects
 from icing_env.errors import InputError, nearest
 from icing_env.record import FloatArray
-from sim2real.candidates import Bank, Family, bank, not_testable
+from sim2real.candidates import Bank, Family, bank, not_testable, unbroken
 from sim2real.channels import MEASURED
 from sim2real.manoeuvre import DURATION, MANOEUVRES, Manoeuvre
 from sim2real.planned import evidence, planned, template
@@ -141,7 +141,7 @@ def _flights(manoeuvres: Sequence[Manoeuvre], empty: Reconstruction
 def _sizes(full: Bank) -> Bank:
     """The candidates without generic terms, every parameter towards its typical sign at sizes of a geometric series."""
     row, families = 1 + len(full.nuisances), []
-    for family in full.families:
+    for family in unbroken(full.families):
         p = family.parameter
         end = p.high if (p.typical or 1.0) > p.neutral else p.low
         nodes = sorted({*np.geomspace(FINEST, 1.0, SIZES), abs((_typical(family) - p.neutral) / (end - p.neutral))})

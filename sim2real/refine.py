@@ -17,11 +17,11 @@ from scipy.special import logsumexp
 
 from icing_env import effects
 from icing_env.record import FloatArray
-from sim2real.attribution import Hypothesis, Posterior, better, forgive, normalised
 from sim2real.candidates import NUISANCE_STEP, Bank
 from sim2real.evidence import Evidence, compare, predicted
 from sim2real.form import Form, gain, own_terms, room, split
 from sim2real.generic import fit_unknown
+from sim2real.hypotheses import Hypothesis, Posterior, better, forgive, normalised
 from sim2real.predictor import innovations
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline

@@ -13,10 +13,10 @@ from scipy.linalg import block_diag
 from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real import gap
-from sim2real.attribution import Hypothesis, Posterior
 from sim2real.channels import SURFACES
 from sim2real.discrepancy import Description
 from sim2real.evidence import Evidence
+from sim2real.hypotheses import Hypothesis, Posterior
 from sim2real.reconstruct import Reconstruction
 from sim2real.sets import SetFit
 from sim2real.windows import FREE, cut

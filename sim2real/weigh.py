@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from icing_env.record import FloatArray
-from sim2real.attribution import Hypothesis, Posterior, attribute, nuisance_mean, reduce, with_prior
+from sim2real.attribution import attribute, nuisance_mean, reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, shifted
 from sim2real.evidence import SIGMAS, Evidence, choose_gain, gather
+from sim2real.hypotheses import Hypothesis, Posterior
 from sim2real.kalman import Gain, gains
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from sim2real.attribution import Posterior
 from sim2real.evidence import Evidence
+from sim2real.hypotheses import Posterior
 
 REGIME_VARIABLES = ("alpha", "airspeed", "beta", "q", "p")
 BINS = 4

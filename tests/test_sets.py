@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim2real.attribution import Posterior, attribute, with_prior
+from sim2real.attribution import attribute, with_prior
 from sim2real.candidates import Bank, bank
 from sim2real.generic import beside
+from sim2real.hypotheses import Posterior
 from sim2real.sets import SetFit, descend, integrate, pairs
 from sim2real.sizes import flown_weights, in_powers
 from sim2real.where import components

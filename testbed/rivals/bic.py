@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from icing_env.record import FlightRecord
-from sim2real.candidates import Bank, Family, bank, not_testable
+from sim2real.candidates import Bank, bank, not_testable, unbroken
 from sim2real.evidence import SIGMAS, gather
 from sim2real.kalman import gains
 from sim2real.reconstruct import reconstruct
@@ -54,9 +54,9 @@ def consider(records: Sequence[FlightRecord]) -> Opinion:
 def effects_alone() -> Bank:
     """The library without nuisances and generic terms, each effect at the sizes nearest to its typical one."""
     families, row = [], 1
-    for family in bank().families:
+    for family in unbroken(bank().families):
         nearest = sorted(family.nodes, key=lambda size: abs(abs(size) - abs(family.parameter.typical)))
         nodes = tuple(sorted(nearest[:SIZES]))
-        families.append(Family(family.effect, family.parameter, nodes, tuple(range(row, row + len(nodes)))))
+        families.append(replace(family, nodes=nodes, rows=tuple(range(row, row + len(nodes)))))
         row += len(nodes)
     return replace(bank(), nuisances=(), terms=(), families=tuple(families), size=row)
