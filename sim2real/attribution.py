@@ -25,8 +25,8 @@ from sim2real.singles import EffectFit, ambiguity, fit_family
 from sim2real.sizes import flown_weights, in_powers
 
 # Prior (assumed): what is left is shared by single effects. A pair is about one per cent as likely as either member.
-P_NONE, P_UNKNOWN, P_PAIRS, P_TRIPLES, P_BESIDE = 0.5, 0.05, 0.07, 0.007, 0.007
-BESIDE = 6  # leading sets that something unknown is tried beside
+P_NONE, P_UNKNOWN, P_PAIRS, P_TRIPLES, P_BESIDE = 0.5, 0.05, 0.07, 0.002, 0.007
+BESIDE, MOST_BESIDE = 6, 2  # leading sets that something unknown is tried beside, and effects they may have
 
 def reduce(gram: FloatArray, bank: Bank, precision: FloatArray | None = None) -> FloatArray:
     """Inner products after the nuisances are integrated out.
@@ -92,14 +92,15 @@ def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision
     found, unknown_fits = homes(found, fit_unknown(reduced, bank), float(reduced[0, 0]))
     least = min([h.left for h in found] + [u.misfit for u in unknown_fits] + [noise])
     found = forgive(found, float(reduced[0, 0]), least)
-    leading = sorted(found, key=lambda h: -h.log_posterior)[:BESIDE]
+    few = [h for h in found if len(h.effects) <= MOST_BESIDE]
+    leading = sorted(few, key=lambda h: -h.log_posterior)[:BESIDE]
     if found[0] not in leading:
         leading.append(found[0])
     for known in leading:
         form, beside_it = _with_unknown(reduced, bank, known, unknown_fits)
         found[found.index(known)] = replace(known, form=better(known.form, form))
         found += beside_it
-    kept = normalised(forgive(found, float(reduced[0, 0]), min(least, *(h.left for h in found))))
+    kept = normalised(forgive(found, float(reduced[0, 0]), min(least, *(h.left for h in found))), 0.0)
     return Posterior(kept, fits, unknown_fits, ambiguity(reduced, fits, _inclusion(kept)), reduced)
 
 

@@ -161,11 +161,11 @@ def _regained(h: Hypothesis, nothing: float, least: float) -> float:
     return float(np.logaddexp(np.log(1.0 - OTHER_FORM), np.log(OTHER_FORM) + other))
 
 
-def normalised(found: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
-    """Probabilities of hypotheses, sorted; sets of several that are next to impossible are dropped."""
+def normalised(found: Sequence[Hypothesis], least: float = KEPT) -> tuple[Hypothesis, ...]:
+    """Probabilities of hypotheses, sorted; sets of several that are less probable than `least` are dropped."""
     logs = np.array([h.log_posterior for h in found])
     share = np.exp(logs - logsumexp(logs))
-    keep = [i for i, h in enumerate(found) if share[i] > KEPT or (len(h.effects) < 2 and not (h.effects and h.unknown))]
+    keep = [i for i, h in enumerate(found) if share[i] >= least or (len(h.effects) < 2 and not (h.effects and h.unknown))]
     total = float(share[keep].sum())
     out = [replace(found[i], probability=float(share[i]) / total) for i in keep]
     return tuple(sorted(out, key=lambda h: -h.probability))

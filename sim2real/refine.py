@@ -100,7 +100,7 @@ def refine(flights: Sequence[Reconstruction], candidates: Bank, evidences: Seque
         found[best] = replace(found[best], form=better(found[best].form, form))
         least = min([_least(found, points, noise), *(h.left for h in others)])
         found = forgive([h for j, h in enumerate(found) if j not in beside] + others, nothing, least)
-    return replace(posterior, hypotheses=normalised(found))
+    return replace(posterior, hypotheses=normalised(found, 0.0))
 
 
 def _inherited(found: Sequence[Hypothesis], before: Sequence[Hypothesis], points: Iterable[int]) -> list[Hypothesis]:

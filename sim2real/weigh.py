@@ -11,7 +11,7 @@ from icing_env.record import FloatArray
 from sim2real.attribution import attribute, nuisance_mean, reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, shifted
 from sim2real.evidence import SIGMAS, Evidence, choose_gain, gather
-from sim2real.hypotheses import Hypothesis, Posterior
+from sim2real.hypotheses import Hypothesis, Posterior, normalised
 from sim2real.kalman import Gain, gains
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
@@ -54,7 +54,7 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
             return centre + nuisance_mean(gram, candidates, known.weights)
 
         posterior = refine(flights, candidates, evidences, baseline, start, posterior)
-    return evidences, posterior
+    return evidences, replace(posterior, hypotheses=normalised(posterior.hypotheses))
 
 
 def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline) -> tuple[FloatArray, list[Gain]]:
