@@ -165,7 +165,8 @@ def normalised(found: Sequence[Hypothesis], least: float = KEPT) -> tuple[Hypoth
     """Probabilities of hypotheses, sorted; sets of several that are less probable than `least` are dropped."""
     logs = np.array([h.log_posterior for h in found])
     share = np.exp(logs - logsumexp(logs))
-    keep = [i for i, h in enumerate(found) if share[i] >= least or (len(h.effects) < 2 and not (h.effects and h.unknown))]
+    always = [len(h.effects) < 2 and not (h.effects and h.unknown) for h in found]
+    keep = [i for i in range(len(found)) if share[i] >= least or always[i]]
     total = float(share[keep].sum())
     out = [replace(found[i], probability=float(share[i]) / total) for i in keep]
     return tuple(sorted(out, key=lambda h: -h.probability))
