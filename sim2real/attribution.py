@@ -20,7 +20,7 @@ from sim2real.candidates import NUISANCE_STEP, Bank
 from sim2real.form import Form, gain, own_terms, room, split, without
 from sim2real.generic import UnknownFit, beside, fit_unknown
 from sim2real.hypotheses import Hypothesis, Posterior, better, forgive, homes, normalised
-from sim2real.sets import INTEGRATED, SetFit, grow, integrate, pairs
+from sim2real.sets import INTEGRATED, SetFit, grow, integrate, pairs, sizes_tried
 from sim2real.singles import EffectFit, ambiguity, fit_family
 from sim2real.sizes import flown_weights, in_powers
 
@@ -130,8 +130,9 @@ def _several(reduced: FloatArray, bank: Bank, testable: list[int]) -> list[Hypot
     if len(testable) < 3:
         return []
     problem, n = in_powers(reduced, bank.families), len({bank.families[i].effect.name for i in testable})
-    two = pairs(problem, testable)
-    three = grow(problem, two, testable)
+    grid = sizes_tried(problem)
+    two = pairs(problem, testable, grid)
+    three = grow(problem, two, testable, grid)
     out = []
     for modes, prior, count in ((two, P_PAIRS, n * (n - 1) / 2), (three, P_TRIPLES, n * (n - 1) * (n - 2) / 6)):
         best = np.argsort(-modes.log)[:INTEGRATED]

@@ -170,3 +170,12 @@ def normalised(found: Sequence[Hypothesis], least: float = KEPT) -> tuple[Hypoth
     total = float(share[keep].sum())
     out = [replace(found[i], probability=float(share[i]) / total) for i in keep]
     return tuple(sorted(out, key=lambda h: -h.probability))
+
+
+def leaving_out(posterior: Posterior, names: Sequence[str]) -> Posterior:
+    """The posterior without some effects: what they held is shared by all that is left."""
+    gone = set(names)
+    left = [h for h in posterior.hypotheses if not gone & set(h.effects)]
+    classes = {n: tuple(m for m in near if m not in gone) for n, near in posterior.classes.items() if n not in gone}
+    return replace(posterior, hypotheses=normalised(left, 0.0), classes=classes,
+                   fits={n: fit for n, fit in posterior.fits.items() if n not in gone})

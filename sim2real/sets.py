@@ -17,7 +17,7 @@ from icing_env.record import FloatArray
 from sim2real.candidates import Family
 from sim2real.sizes import Powers, flown_weights
 
-COARSE = 41  # sizes of each effect on the grid that all pairs are tried on
+COARSE = 31  # sizes of each effect on the grid that all pairs are tried on
 DESCENTS = 8
 INTEGRATED = 40  # sets of one size whose evidence is integrated on a grid; the rest is Laplace's approximation
 POINTS = {1: 201, 2: 41, 3: 13}  # of that grid along each axis
@@ -69,11 +69,14 @@ class Modes:
     log: FloatArray
 
 
-def pairs(problem: Powers, testable: Sequence[int]) -> Modes:
-    """Every pair of families of different effects at its best sizes."""
+Grid = tuple[FloatArray, FloatArray, FloatArray]
+
+
+def pairs(problem: Powers, testable: Sequence[int], grid: Grid) -> Modes:
+    """Every pair of families of different effects at its best sizes; `grid` of `sizes_tried`."""
     names = [f.effect.name for f in problem.families]
     chosen = np.array([(i, j) for i in testable for j in testable if i < j and names[i] != names[j]], np.intp)
-    x, energy, cross = _grid(problem)
+    x, energy, cross = grid
     start = np.empty((len(chosen), 2))
     for n, (i, j) in enumerate(chosen):
         together = energy[i][:, None] + energy[j][None, :] + cross[i, :, j, :]
@@ -82,12 +85,12 @@ def pairs(problem: Powers, testable: Sequence[int]) -> Modes:
     return descend(problem, chosen.reshape(-1, 2), start)
 
 
-def grow(problem: Powers, found: Modes, testable: Sequence[int]) -> Modes:
-    """Sets with one member more than the SEEDS best of `found`."""
+def grow(problem: Powers, found: Modes, testable: Sequence[int], grid: Grid) -> Modes:
+    """Sets with one member more than the SEEDS best of `found`; `grid` of `sizes_tried`."""
     names = [f.effect.name for f in problem.families]
     members: list[tuple[int, ...]] = []
     start: list[tuple[float, ...]] = []
-    x, _, cross = _grid(problem)
+    x, _, cross = grid
     for n in np.argsort(-found.log)[:SEEDS]:
         base = found.members[n]
         inside = {names[m] for m in base}
@@ -110,7 +113,7 @@ def _columns(problem: Powers, member: int) -> slice:
     return slice(1 + member * problem.degree, 1 + (member + 1) * problem.degree)
 
 
-def _grid(problem: Powers) -> tuple[FloatArray, FloatArray, FloatArray]:
+def sizes_tried(problem: Powers) -> Grid:
     """Sizes x [F, COARSE], half the square each leaves over less its residual's, and inner products between them."""
     x = np.linspace(problem.low, problem.high, COARSE, axis=1)
     powers = x[:, :, None] ** np.arange(1, problem.degree + 1)

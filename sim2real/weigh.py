@@ -11,7 +11,7 @@ from icing_env.record import FloatArray
 from sim2real.attribution import attribute, nuisance_mean, reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, shifted
 from sim2real.evidence import SIGMAS, Evidence, choose_gain, gather
-from sim2real.hypotheses import Hypothesis, Posterior, normalised
+from sim2real.hypotheses import Hypothesis, Posterior, leaving_out, normalised
 from sim2real.kalman import Gain, gains
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
@@ -126,7 +126,7 @@ def weigh(evidences: Sequence[Evidence], candidates: Bank, untestable: dict[str,
     quiet = [name for name, found in posterior.fits.items() if found.smallest is None]
     for name in quiet:
         untestable[name] = "no excitation: these records would not show it anywhere in its range"
-    return posterior_of(tempering) if quiet else posterior
+    return leaving_out(posterior, quiet)
 
 
 def temper(misfit: float, evidences: Sequence[Evidence]) -> float:
