@@ -17,9 +17,9 @@ from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
 from sim2real.candidates import NUISANCE_STEP, Bank
-from sim2real.form import Form, gain, own_terms, room, split, without
+from sim2real.form import Form, gain, own_terms, room, split, with_terms, without
 from sim2real.generic import UnknownFit, beside, fit_unknown
-from sim2real.hypotheses import Hypothesis, Posterior, better, forgive, homes, normalised
+from sim2real.hypotheses import Hypothesis, Posterior, forgive, homes, normalised
 from sim2real.sets import INTEGRATED, SetFit, grow, integrate, pairs, sizes_tried
 from sim2real.singles import EffectFit, ambiguity, fit_family
 from sim2real.sizes import flown_weights, in_powers
@@ -97,8 +97,8 @@ def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision
     if found[0] not in leading:
         leading.append(found[0])
     for known in leading:
-        form, beside_it = _with_unknown(reduced, bank, known, unknown_fits)
-        found[found.index(known)] = replace(known, form=better(known.form, form))
+        home, beside_it = _with_unknown(reduced, bank, known, unknown_fits)
+        found[found.index(known)] = replace(known, form=with_terms(known.form, home))
         found += beside_it
     kept = normalised(forgive(found, float(reduced[0, 0]), min(least, *(h.left for h in found))), 0.0)
     return Posterior(kept, fits, unknown_fits, ambiguity(reduced, fits, _inclusion(kept)), reduced)
@@ -165,19 +165,19 @@ def _form(reduced: FloatArray, bank: Bank, fit: SetFit) -> Form:
 
 
 def _with_unknown(reduced: FloatArray, bank: Bank, known: Hypothesis,
-                  alone: Sequence[UnknownFit]) -> tuple[Form | None, list[Hypothesis]]:
-    """An explanation with something unknown beside it (alone where it explains nothing), and its form."""
+                  alone: Sequence[UnknownFit]) -> tuple[UnknownFit | None, list[Hypothesis]]:
+    """An explanation with something unknown beside it (alone where it explains nothing), and terms of its form."""
     fits: list[UnknownFit] = list(alone)
-    form: Form | None = None
+    own: UnknownFit | None = None
     if known.effects:
         fits = fit_unknown(beside(reduced, bank, known.fit, _slopes(known.fit)), bank)
-        form, fits = split(known.fit, reduced, fits)
+        own, fits = split(known.fit, reduced, fits)
     if not fits:
-        return form, []
+        return own, []
     best = max(fits, key=lambda u: u.log_evidence)
     gained = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
     share = np.log(P_BESIDE / (1.0 - P_NONE)) + known.log_prior if known.effects else np.log(P_UNKNOWN)
-    return form, [Hypothesis(known.fit, best, float(share), known.log_evidence + gained)]
+    return own, [Hypothesis(known.fit, best, float(share), known.log_evidence + gained)]
 
 
 def _slopes(fit: SetFit) -> list[dict[int, float]]:

@@ -40,10 +40,28 @@ ALIKE = {
 
 @dataclass(frozen=True)
 class Form:
-    """A set in another form: log evidence that generic terms at home add, and the whitened square left after them."""
+    """A set in another form, by how much generic terms at home may take (nothing first).
 
-    gained: float
-    left: float
+    gained: log evidence that they add, prior included; left: whitened square after them.
+    """
+
+    gained: tuple[float, ...]
+    left: tuple[float, ...]
+
+    @property
+    def least(self) -> float:
+        """Whitened square left where the terms take most."""
+        return min(self.left)
+
+    def regained(self, nothing: float, noise: float) -> float:
+        """Log evidence of another form, with what is forgiven.
+
+        Args:
+            nothing: whitened square that no explanation leaves.
+            noise: that noise alone leaves.
+        """
+        return float(logsumexp([gained + forgiven(left - noise, nothing - left)
+                                for gained, left in zip(self.gained, self.left, strict=True)]))
 
 
 def forgiven(left: float, explained: float) -> float:
@@ -117,7 +135,7 @@ def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float)
     """
     used = np.flatnonzero((np.diag(inner) > 1e-9) & (square > 0.0))
     if not len(used):
-        return Form(0.0, misfit)
+        return Form((0.0,), (misfit,))
     logs, taken = [0.0], [0.0]
     for share in SHARES:
         most = share**2 * square[used]
@@ -129,7 +147,7 @@ def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float)
         # a Gaussian prior alone would not forbid a larger remainder
         logs.append(min(log, 0.5 * float(most.sum())))
         taken.append(min(float(2.0 * at @ along - at @ scaled @ at), float(most.sum())))
-    return Form(float(logsumexp(logs)) - float(np.log(len(logs))), misfit - taken[int(np.argmax(logs))])
+    return Form(tuple(log - float(np.log(len(logs))) for log in logs), tuple(misfit - t for t in taken))
 
 
 def is_own(fit: SetFit, reduced: FloatArray, unknown: UnknownFit) -> bool:
@@ -138,9 +156,14 @@ def is_own(fit: SetFit, reduced: FloatArray, unknown: UnknownFit) -> bool:
     return at_home(unknown.component, fit.effects) and taken <= max(SHARES) ** 2 * _explained(fit, reduced)
 
 
-def split(fit: SetFit, reduced: FloatArray, fits: Sequence[UnknownFit]) -> tuple[Form | None, list[UnknownFit]]:
-    """A set's form where the best of the generic fits beside it is its own, and the fits that are not."""
+def split(fit: SetFit, reduced: FloatArray, fits: Sequence[UnknownFit]) -> tuple[UnknownFit | None, list[UnknownFit]]:
+    """The best of the generic fits beside a set that is its own form, and the fits that are not."""
     own = [u for u in fits if is_own(fit, reduced, u)]
-    best = max(own, key=lambda u: u.log_evidence, default=None)
-    form = None if best is None else Form(best.log_evidence - float(np.log(len(SHARES))), best.misfit)
-    return form, [u for u in fits if u not in own]
+    return max(own, key=lambda u: u.log_evidence, default=None), [u for u in fits if u not in own]
+
+
+def with_terms(form: Form | None, own: UnknownFit | None) -> Form | None:
+    """The form with generic terms beside the set as one more way, as likely as each share."""
+    if own is None or form is None:
+        return form
+    return Form((*form.gained, own.log_evidence - float(np.log(len(SHARES)))), (*form.left, own.misfit))

@@ -48,7 +48,7 @@ class Hypothesis:
     def left(self) -> float:
         """Whitened square that it leaves over at best, other forms included."""
         own = self.unknown.misfit if self.unknown else self.fit.misfit
-        forms = [] if self.form is None else [self.form.left]
+        forms = [] if self.form is None else [self.form.least]
         return min([own, *forms, *([] if self.instead is None else [self.instead.misfit])])
 
     @property
@@ -133,11 +133,6 @@ def homes(found: Sequence[Hypothesis], alone: Sequence[UnknownFit],
     return out, tuple(left)
 
 
-def better(one: Form | None, other: Form | None) -> Form | None:
-    """The form with more evidence."""
-    return max((form for form in (one, other) if form is not None), key=lambda form: form.gained, default=None)
-
-
 def forgive(found: Sequence[Hypothesis], nothing: float, least: float) -> list[Hypothesis]:
     """Hypotheses with what another form, and a remainder that is forgiven, regain.
 
@@ -153,7 +148,7 @@ def _regained(h: Hypothesis, nothing: float, least: float) -> float:
         return forgiven(h.left - least, nothing - h.left)
     if h.form is None:
         return 0.0
-    other = h.form.gained + forgiven(h.form.left - least, nothing - h.form.left)
+    other = h.form.regained(nothing, least)
     if h.instead is not None:
         left = h.instead.misfit
         alone = h.instead.log_evidence - h.log_evidence + forgiven(left - least, nothing - left)

@@ -19,9 +19,9 @@ from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.candidates import NUISANCE_STEP, Bank
 from sim2real.evidence import Evidence, compare, predicted
-from sim2real.form import Form, gain, own_terms, room, split
-from sim2real.generic import fit_unknown
-from sim2real.hypotheses import Hypothesis, Posterior, better, forgive, normalised
+from sim2real.form import Form, gain, own_terms, room, split, with_terms
+from sim2real.generic import UnknownFit, fit_unknown
+from sim2real.hypotheses import Hypothesis, Posterior, forgive, normalised
 from sim2real.predictor import innovations
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
@@ -91,16 +91,19 @@ def refine(flights: Sequence[Reconstruction], candidates: Bank, evidences: Seque
         found = forgive(_inherited(found, before, points), nothing, _least(found, points, noise))
         best = max((i for i, h in enumerate(found) if h.unknown is None), key=lambda i: found[i].log_posterior)
         waiting = [] if best in points else [best]
-    best = max(points, key=lambda i: found[i].log_posterior)
-    beside = [j for j, h in enumerate(found) if h.unknown is not None and h.effects == found[best].effects]
-    if beside:
-        left = _left_over(flights, candidates, evidences, baseline, posterior.tempering, found[best].fit, points[best],
+    # something unknown beside a set is believed only where the set has been flown: beside the best, and the best alone
+    ranked = sorted(points, key=lambda i: -found[i].log_posterior)
+    others: list[Hypothesis] = []
+    for i in dict.fromkeys([ranked[0], *[j for j in ranked if len(found[j].effects) == 1][:1]]):
+        beside = [h for h in found if h.unknown is not None and h.effects == found[i].effects]
+        left = _left_over(flights, candidates, evidences, baseline, posterior.tempering, found[i].fit, points[i],
                           candidates.terms)
-        form, others = _beside(candidates, posterior, left, found[best], [found[j] for j in beside])
-        found[best] = replace(found[best], form=better(found[best].form, form))
-        least = min([_least(found, points, noise), *(h.left for h in others)])
-        found = forgive([h for j, h in enumerate(found) if j not in beside] + others, nothing, least)
-    return replace(posterior, hypotheses=normalised(found, 0.0))
+        home, more = _beside(candidates, posterior, left, found[i], beside)
+        found[i] = replace(found[i], form=with_terms(found[i].form, home))
+        others += more
+    known = [h for h in found if h.unknown is None or (not h.effects and found[ranked[0]].effects)]
+    least = min([_least(found, points, noise), *(h.left for h in others)])
+    return replace(posterior, hypotheses=normalised(forgive(known + others, nothing, least), 0.0))
 
 
 def _inherited(found: Sequence[Hypothesis], before: Sequence[Hypothesis], points: Iterable[int]) -> list[Hypothesis]:
@@ -118,13 +121,22 @@ def _inherited(found: Sequence[Hypothesis], before: Sequence[Hypothesis], points
         now, then = found[nearest], before[nearest]
         more = now.fit.misfit - then.fit.misfit
         form, unknown = h.form, h.unknown
-        if form is not None and now.form is not None and then.form is not None:
-            form = Form(form.gained + now.form.gained - then.form.gained, form.left + now.form.left - then.form.left)
+        if form is not None:
+            form = _moved(form, now.form, then.form, more)
         if unknown is not None:
             unknown = replace(unknown, misfit=unknown.misfit + more)
         out[i] = replace(h, fit=replace(h.fit, misfit=h.fit.misfit + more), form=form, unknown=unknown,
                          log_evidence=h.log_evidence + now.log_evidence - then.log_evidence)
     return out
+
+
+def _moved(form: Form, now: Form | None, then: Form | None, more: float) -> Form:
+    """A form corrected by as much as another was, or by `more` of whitened square where the two cannot be compared."""
+    if now is None or then is None or not len(form.gained) == len(now.gained) == len(then.gained):
+        return Form(form.gained, tuple(left + more for left in form.left))
+    ways = range(len(form.gained))
+    return Form(tuple(form.gained[k] + now.gained[k] - then.gained[k] for k in ways),
+                tuple(form.left[k] + now.left[k] - then.left[k] for k in ways))
 
 
 def _least(found: Sequence[Hypothesis], points: Iterable[int], noise: float) -> float:
@@ -158,19 +170,19 @@ def _left_over(flights: Sequence[Reconstruction], candidates: Bank, evidences: S
 
 
 def _beside(candidates: Bank, posterior: Posterior, left: FloatArray, known: Hypothesis,
-            others: Sequence[Hypothesis]) -> tuple[Form | None, list[Hypothesis]]:
-    """The unknown beside a set (or alone), judged on what it leaves where it was flown, and the set's form."""
+            others: Sequence[Hypothesis]) -> tuple[UnknownFit | None, list[Hypothesis]]:
+    """Terms of a set's own form, and the unknown beside it (or alone), judged on what it leaves where it was flown."""
     moved = tuple(replace(term, row=1 + j) for j, term in enumerate(candidates.terms))
-    form: Form | None = None
+    own: UnknownFit | None = None
     fits = fit_unknown(left, replace(candidates, terms=moved))
     if known.effects:
-        form, fits = split(known.fit, posterior.reduced, fits)
+        own, fits = split(known.fit, posterior.reduced, fits)
     if not fits:
-        return form, []
+        return own, []
     best = max(fits, key=lambda u: u.log_evidence)
     add = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
     weights = {t.row: best.weights[1 + j] for j, t in enumerate(candidates.terms) if 1 + j in best.weights}
-    return form, [replace(other, fit=known.fit, unknown=replace(best, weights=weights),
+    return own, [replace(other, fit=known.fit, unknown=replace(best, weights=weights),
                           log_evidence=known.log_evidence + add) for other in others]  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.linalg import solve_discrete_are
+from scipy.linalg import solve_continuous_lyapunov, solve_discrete_are
 
 from testbed.withheld import gusts, instruments, trim
 from testbed.withheld import plant as pl
@@ -98,7 +98,9 @@ def whitener(speed: float, sigma: float, scale: float, level: float) -> Whitener
         Dy[out] = C_all[seen, 10:15]
     for out, column in ((3, 6), (4, 7), (5, 8)):
         Cy[out, column] = 1.0
-    return _assembled(Fx, Qx, gamma, Cy, Dy, level)
+    stationary = np.zeros((6, 6))  # of the gust and of the tail's delay, which nobody knows at the start either
+    stationary[:] = solve_continuous_lyapunov(Ac[10:, 10:], -noise[10:] @ noise[10:].T)
+    return _assembled(Fx, Qx, gamma, Cy, Dy, level, np.linalg.cholesky(stationary + 1e-12 * np.eye(6)))
 
 
 def _sensors() -> tuple[NDArray, NDArray]:
@@ -115,7 +117,8 @@ def _sensors() -> tuple[NDArray, NDArray]:
     return S, E
 
 
-def _assembled(Fx: NDArray, Qx: NDArray, gamma: NDArray, Cy: NDArray, Dy: NDArray, level: float) -> Whitener:
+def _assembled(Fx: NDArray, Qx: NDArray, gamma: NDArray, Cy: NDArray, Dy: NDArray, level: float,
+               gust: NDArray) -> Whitener:
     S, E = _sensors()
     C9, D9 = Cy[:9], Dy[:9]
     n, total = 16, 27
@@ -134,10 +137,9 @@ def _assembled(Fx: NDArray, Qx: NDArray, gamma: NDArray, Cy: NDArray, Dy: NDArra
     P = solve_discrete_are(F.T, M.T, Q, R)
     innovation = M @ P @ M.T + R
     K = F @ P @ M.T @ np.linalg.inv(innovation)
-    starts = np.zeros((total, 10))
-    starts[:10] = np.diag(START)
-    settled = np.linalg.solve(np.eye(11) - S, E @ C9[:, :10])
-    starts[n:] = settled @ np.diag(START)
+    starts = np.zeros((total, n))
+    starts[:10, :10], starts[10:n, 10:] = np.diag(START), gust
+    starts[n:] = np.linalg.solve(np.eye(11) - S, E @ C9) @ starts[:n]
     return Whitener(F, K, M, spread @ gamma, np.vstack([np.zeros((n, 5)), E @ D9]),
                     np.linalg.inv(np.linalg.cholesky(innovation)), starts)  # fmt: skip
 

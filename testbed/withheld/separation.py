@@ -75,7 +75,8 @@ def geometry(plan: int, gain: float, sigma: float, scale: float, level: float) -
     filters = [distance.whitener(m.speed, sigma, scale, level) for m in PLANS[plan][:DIAGNOSED]]
     starts, columns = [], []
     for w, y, u, p in zip(filters, held.motion, held.inputs, held.paths, strict=True):
-        silent = np.zeros((len(y), 12, 10)), np.zeros((len(y), 5, 10))
+        count = w.starts.shape[1]
+        silent = np.zeros((len(y), 12, count)), np.zeros((len(y), 5, count))
         s = distance.whiten(w, *silent, w.starts)
         starts.append(s)
         columns.append(np.vstack([_clear(distance.whiten(w, y, u), s), p / level]))
