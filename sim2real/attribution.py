@@ -19,13 +19,22 @@ from icing_env.record import FloatArray
 from sim2real.candidates import NUISANCE_STEP, Bank
 from sim2real.form import Form, gain, own_terms, room, split, with_terms, without
 from sim2real.generic import UnknownFit, beside, fit_unknown
-from sim2real.hypotheses import Hypothesis, Posterior, forgive, homes, normalised
+from sim2real.hypotheses import (
+    P_BESIDE,
+    P_NONE,
+    P_PAIRS,
+    P_TRIPLES,
+    P_UNKNOWN,
+    Hypothesis,
+    Posterior,
+    forgive,
+    homes,
+    normalised,
+)
 from sim2real.sets import INTEGRATED, SetFit, grow, integrate, pairs, sizes_tried
 from sim2real.singles import EffectFit, ambiguity, fit_family
 from sim2real.sizes import flown_weights, in_powers
 
-# Prior (assumed): what is left is shared by single effects. A pair is about one per cent as likely as either member.
-P_NONE, P_UNKNOWN, P_PAIRS, P_TRIPLES, P_BESIDE = 0.5, 0.05, 0.07, 0.002, 0.007
 BESIDE, MOST_BESIDE = 6, 2  # leading sets that something unknown is tried beside, and effects they may have
 
 def reduce(gram: FloatArray, bank: Bank, precision: FloatArray | None = None) -> FloatArray:

@@ -15,11 +15,10 @@ from icing_env.errors import InputError, nearest
 from icing_env.jit import source_hash
 from icing_env.record import DataProblem, FlightRecord
 from sim2real import gap
-from sim2real.attribution import P_NONE, P_UNKNOWN
 from sim2real.candidates import SPREAD, Bank, bank, not_testable
 from sim2real.discrepancy import describe_unknown, described
 from sim2real.evidence import Evidence
-from sim2real.hypotheses import Posterior
+from sim2real.hypotheses import P_NONE, P_UNKNOWN, Posterior
 from sim2real.ladder import ladder
 from sim2real.manoeuvre import next_manoeuvre
 from sim2real.reconstruct import Reconstruction, reconstruct

@@ -12,7 +12,7 @@ Gaussian's gives a Student's t), up to a share of what the set explains. What is
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -25,7 +25,9 @@ from sim2real.terms import Term
 
 OTHER_FORM = 0.5  # prior probability that an effect has not the library's form (assumed)
 SHARES = (0.15, 0.4, 1.0)  # rho: what terms at home may take, over what the set explains; equally likely (assumed)
-FORGIVEN = 0.3  # of its signature, that a set may leave over anywhere for no reason that anybody could name (assumed)
+# Of its signature, that a set may leave over for no reason that anybody could name; and where a component that it does
+# not enter would be a reason (assumed).
+FORGIVEN, LEAK = 0.3, 0.04
 DIRECTIONS = 10.0  # in which such a remainder lies (assumed)
 MOSTLY = 0.5  # of what generic terms explain: an effect that explains more of it is what they are (assumed)
 LEAST = 3.0  # whitened size of a set's signature below which its form does not matter
@@ -42,11 +44,13 @@ ALIKE = {
 class Form:
     """A set in another form, by how much generic terms at home may take (nothing first).
 
-    gained: log evidence that they add, prior included; left: whitened square after them.
+    gained: log evidence that they add, prior included; left: whitened square after them; foreign: as much of it as
+    generic terms of one component would explain where the set does not enter.
     """
 
     gained: tuple[float, ...]
     left: tuple[float, ...]
+    foreign: float = 0.0
 
     @property
     def least(self) -> float:
@@ -60,18 +64,21 @@ class Form:
             nothing: whitened square that no explanation leaves.
             noise: that noise alone leaves.
         """
-        return float(logsumexp([gained + forgiven(left - noise, nothing - left)
+        return float(logsumexp([gained + forgiven(left - noise, nothing - left, self.foreign)
                                 for gained, left in zip(self.gained, self.left, strict=True)]))
 
 
-def forgiven(left: float, explained: float) -> float:
+def forgiven(left: float, explained: float, foreign: float = 0.0) -> float:
     """Log evidence that a remainder regains where its scale is unknown.
 
     Args:
         left: whitened square above what noise leaves.
         explained: whitened square explained.
+        foreign: as much of `left` as generic terms of one component would explain where the set does not enter.
     """
-    most = min(max(left, 0.0), FORGIVEN**2 * max(explained, 0.0))
+    left, explained = max(left, 0.0), max(explained, 0.0)
+    elsewhere = min(max(foreign, 0.0), left)
+    most = min(left - elsewhere, FORGIVEN**2 * explained) + min(elsewhere, LEAK**2 * explained)
     return float(0.5 * most - 0.5 * DIRECTIONS * np.log1p(most / DIRECTIONS))
 
 
@@ -166,4 +173,5 @@ def with_terms(form: Form | None, own: UnknownFit | None) -> Form | None:
     """The form with generic terms beside the set as one more way, as likely as each share."""
     if own is None or form is None:
         return form
-    return Form((*form.gained, own.log_evidence - float(np.log(len(SHARES)))), (*form.left, own.misfit))
+    gained = own.log_evidence - float(np.log(len(SHARES)))
+    return replace(form, gained=(*form.gained, gained), left=(*form.left, own.misfit))

@@ -14,6 +14,8 @@ from sim2real.generic import UnknownFit
 from sim2real.sets import SetFit
 from sim2real.singles import EffectFit
 
+# Prior (assumed): what is left is shared by single effects. A pair is about one per cent as likely as either member.
+P_NONE, P_UNKNOWN, P_PAIRS, P_TRIPLES, P_BESIDE = 0.5, 0.05, 0.07, 0.002, 0.007
 KEPT = 1e-5  # sets of several effects less probable than this are dropped
 
 
@@ -110,6 +112,11 @@ class Posterior:
         """Whitened square that the best of all explanations leaves over."""
         return min([h.unknown.misfit if h.unknown else h.fit.misfit for h in self.hypotheses]
                    + [u.misfit for u in self.unknown_fits])  # fmt: skip
+
+
+def pair_prior(effects: int) -> float:
+    """Log prior probability of each pair of so many effects."""
+    return float(np.log(P_PAIRS / (effects * (effects - 1) / 2)))
 
 
 def homes(found: Sequence[Hypothesis], alone: Sequence[UnknownFit],

@@ -3,53 +3,30 @@
 Polynomials between the sizes flown, and signatures that add, hold only nearby: where an effect is large or bends (a
 rate limit, a stall), what the polynomial misses would be blamed on a second effect. Each leading set is therefore flown
 where it was fitted, with its own slopes, and fitted by Gauss-Newton; its evidence is corrected by what it gained or
-lost.
+lost. Beside the best single effect, where it was flown, the whole library is then tried again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from icing_env import effects
 from icing_env.record import FloatArray
-from sim2real.candidates import NUISANCE_STEP, Bank
-from sim2real.evidence import Evidence, compare, predicted
-from sim2real.form import Form, gain, own_terms, room, split, with_terms
+from sim2real.form import Form, at_home, gain, own_terms, room, split, with_terms
 from sim2real.generic import UnknownFit, fit_unknown
-from sim2real.hypotheses import Hypothesis, Posterior, forgive, normalised
-from sim2real.predictor import innovations
-from sim2real.reconstruct import Reconstruction
-from sim2real.references import Baseline
+from sim2real.hypotheses import Hypothesis, Posterior, forgive, normalised, pair_prior
+from sim2real.points import Flying, Point
 from sim2real.sets import Modes, SetFit, integrate
+from sim2real.singles import EffectFit, fit_family
 from sim2real.sizes import in_powers
-from sim2real.terms import Term, pushes
 
 LEADING, LIKELY = 3, 0.02  # explanations that are flown again, and how probable they have to be
 CERTAIN = 0.05  # probability of no gap above which nothing is: sizes near zero have no likelihood of Gaussian shape
-MOST = 8  # explanations flown again before the best need not be one of them
-ROUNDS = 4
-SETTLED = 0.2  # gain of half the whitened square that is worth another round
-FARTHEST = 15.0  # standard deviations of a nuisance: its prior counts, and what is beyond may not fly
-
-
-@dataclass(frozen=True)
-class Point:
-    """A set at given sizes [k] and nuisances [n], flown.
-
-    cost: half the whitened square it leaves, the nuisances' prior included, tempered; slope and information: of sizes
-    (in ranges of their parameters), then nuisances.
-    """
-
-    sizes: FloatArray
-    nuisances: FloatArray
-    cost: float
-    slope: FloatArray
-    information: FloatArray
+MOST = 10  # explanations flown again; what looks better then and has not been flown is not believed
+COMPANIONS, WORTH = 3, 3.0  # effects flown beside the best single one, and the log evidence that they have to add
 
 
 def leading(posterior: Posterior) -> list[Hypothesis]:
@@ -62,67 +39,160 @@ def leading(posterior: Posterior) -> list[Hypothesis]:
     return chosen if any(h.effects for h in chosen) else []
 
 
-def refine(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
-           start: Callable[[Hypothesis], FloatArray], posterior: Posterior) -> Posterior:
+def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior: Posterior) -> Posterior:
     """The posterior with its leading explanations fitted where they lie, until the best of them has been flown.
 
     Args:
-        flights: the records about the baseline.
-        evidences: as gathered, for their gains and whitening.
+        flying: the records, and what flying along them takes.
         start: best nuisances [n] of a hypothesis as far as the linear fit knows.
+        posterior: of the linear fit.
     """
-    found: list[Hypothesis] = list(posterior.hypotheses)
-    before, points = list(found), dict[int, Point]()
-    nothing, noise = float(posterior.reduced[0, 0]), np.inf
-    if posterior.tempering > 1.0:
-        noise = sum(e.samples for e in evidences) / posterior.tempering
-    waiting = [found.index(h) for h in leading(posterior)]
-    while waiting and len(points) < MOST:
+    search = _Search(flying, start, posterior)
+    search.fly([search.found.index(h) for h in leading(posterior)])
+    search.fly(search.companions())
+    while len(search.points) < MOST and (best := search.best()) not in search.points:
+        search.fly([best])
+    return search.posterior()
+
+
+class _Search:
+    """Hypotheses, as they are known so far, and those of them that have been flown."""
+
+    def __init__(self, flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior: Posterior) -> None:
+        self.flying, self.start, self.linear = flying, start, posterior
+        self.found = list(posterior.hypotheses)
+        self.before = list(self.found)  # as the linear fit has them
+        self.points: dict[int, Point] = {}
+        self.generic: dict[int, list[UnknownFit]] = {}
+        self.added: set[int] = set()  # proposed beside a flown one: no linear fit to correct others by
+        self.nothing, self.noise = float(posterior.reduced[0, 0]), np.inf
+        if posterior.tempering > 1.0:
+            self.noise = sum(e.samples for e in flying.evidences) / posterior.tempering
+
+    def fly(self, waiting: Iterable[int]) -> None:
+        """Fly hypotheses, and correct by them those that were not flown."""
         for i in waiting:
-            at = start(found[i])
-            points[i] = _settle(flights, candidates, evidences, baseline, posterior.tempering, found[i].fit, at)
-            found[i] = _corrected(found[i], points[i], posterior)
-            if found[i].effects:
-                own = tuple(own_terms(found[i].effects, candidates.terms))
-                left = _left_over(flights, candidates, evidences, baseline, posterior.tempering, found[i].fit,
-                                  points[i], own)
-                square = room(found[i].fit, posterior.reduced, own)
-                found[i] = replace(found[i], form=gain(left[1:, 1:], left[1:, 0], square, found[i].fit.misfit))
-        found = forgive(_inherited(found, before, points), nothing, _least(found, points, noise))
-        best = max((i for i, h in enumerate(found) if h.unknown is None), key=lambda i: found[i].log_posterior)
-        waiting = [] if best in points else [best]
-    # something unknown beside a set is believed only where the set has been flown: beside the best, and the best alone
-    ranked = sorted(points, key=lambda i: -found[i].log_posterior)
-    others: list[Hypothesis] = []
-    for i in dict.fromkeys([ranked[0], *[j for j in ranked if len(found[j].effects) == 1][:1]]):
-        beside = [h for h in found if h.unknown is not None and h.effects == found[i].effects]
-        left = _left_over(flights, candidates, evidences, baseline, posterior.tempering, found[i].fit, points[i],
-                          candidates.terms)
-        home, more = _beside(candidates, posterior, left, found[i], beside)
-        found[i] = replace(found[i], form=with_terms(found[i].form, home))
-        others += more
-    known = [h for h in found if h.unknown is None or (not h.effects and found[ranked[0]].effects)]
-    least = min([_least(found, points, noise), *(h.left for h in others)])
-    return replace(posterior, hypotheses=normalised(forgive(known + others, nothing, least), 0.0))
+            if i not in self.points:
+                self._fly(i)
+        found = _inherited(self.found, self.before, [j for j in self.points if j not in self.added], self.points)
+        self.found = forgive(found, self.nothing, self._least())
+
+    def best(self) -> int:
+        """The most probable known set, flown or not."""
+        known = [i for i, h in enumerate(self.found) if h.unknown is None]
+        return max(known, key=lambda i: self.found[i].log_posterior)
+
+    def _fly(self, i: int) -> None:
+        h = self.found[i]
+        self.points[i] = self.flying.settle(h.fit, self.start(h), np.zeros(len(self.flying.candidates.nuisances)))
+        h = _corrected(h, self.points[i], self.linear)
+        left = self.flying.left_over(h.fit, self.points[i])
+        bank = self.flying.candidates
+        moved = tuple(replace(term, row=1 + j) for j, term in enumerate(bank.terms))
+        self.generic[i] = fit_unknown(left, replace(bank, terms=moved))
+        if h.effects:
+            own = own_terms(h.effects, moved)
+            rows = [term.row for term in own]
+            form = gain(left[np.ix_(rows, rows)], left[rows, 0], room(h.fit, self.linear.reduced, own), h.fit.misfit)
+            elsewhere = [u for u in self.generic[i] if u.log_evidence > 0.0 and not at_home(u.component, h.effects)]
+            most = max((float(left[0, 0]) - u.misfit for u in elsewhere), default=0.0)
+            h = replace(h, form=replace(form, foreign=most))
+        self.found[i] = h
+
+    def _least(self) -> float:
+        """What noise alone would leave, as far as what was flown shows."""
+        return min([self.noise, *(self.found[i].left for i in self.points)])
+
+    def _ranked(self, effects: int | None = None) -> list[int]:
+        """Flown hypotheses, the best first; those of so many effects alone if given."""
+        chosen = [i for i in self.points if effects is None or len(self.found[i].effects) == effects]
+        return sorted(chosen, key=lambda i: -self.found[i].log_posterior)
+
+    def companions(self) -> list[int]:
+        """Pairs of the best single effect, where it was flown, with whatever explains most of what it leaves."""
+        if not (alone := self._ranked(1)):
+            return []
+        first = self.found[alone[0]]
+        reduced = self.flying.beside(first.fit, self.points[alone[0]])
+        best: dict[str, EffectFit] = {}
+        for family in self.flying.candidates.families:
+            name = family.effect.name
+            if name in self.linear.fits and name not in first.effects:
+                fit = fit_family(reduced, family)
+                if name not in best or fit.log_evidence > best[name].log_evidence:
+                    best[name] = fit
+        promising = sorted(best.values(), key=lambda fit: -fit.log_evidence)[:COMPANIONS]
+        return [self._propose(first, fit) for fit in promising if fit.log_evidence > WORTH]
+
+    def _propose(self, first: Hypothesis, second: EffectFit) -> int:
+        """Index of the pair, with sizes as found beside the first."""
+        known = {h.effects: i for i, h in enumerate(self.found) if h.unknown is None}
+        names = tuple(sorted((*first.effects, second.family.effect.name)))
+        spread = np.array([[((second.high95 - second.low95) / 3.92) ** 2]])
+        one = first.fit
+        covariance = np.zeros((1, 1)) if one.covariance is None else one.covariance
+        fit = SetFit((*one.families, second.family), one.log_evidence + second.log_evidence,
+                     (*one.estimate, second.estimate), (*one.low95, second.low95), (*one.high95, second.high95),
+                     np.block([[covariance, np.zeros((1, 1))], [np.zeros((1, 1)), spread]]),
+                     (one.weights or {}) | second.weights, second.misfit)  # fmt: skip
+        if names in known:
+            i = known[names]
+            if i not in self.points:
+                self.found[i] = replace(self.found[i], fit=fit)
+            return i
+        self.found.append(Hypothesis(fit, None, pair_prior(len(self.linear.fits)), fit.log_evidence))
+        self.before.append(self.found[-1])
+        self.added.add(len(self.found) - 1)
+        return len(self.found) - 1
+
+    def posterior(self) -> Posterior:
+        """All hypotheses with their probabilities.
+
+        Something unknown beside a set is believed only where the set has been flown: beside the best one, and beside
+        the best of single effects.
+        """
+        ranked, others = self._ranked(), list[Hypothesis]()
+        found = list(self.found)
+        for i in dict.fromkeys([ranked[0], *self._ranked(1)[:1]]):
+            known, fits = found[i], self.generic[i]
+            if known.effects:
+                home, fits = split(known.fit, self.linear.reduced, fits)
+                found[i] = replace(known, form=with_terms(known.form, home))
+            others += [_beside(h, known, fits, self.flying) for h in found
+                       if h.unknown is not None and h.effects == known.effects and fits]
+        bound = found[ranked[0]].log_posterior
+        kept = [h for i, h in enumerate(found) if i in self.points or (h.unknown is None and h.log_posterior < bound)
+                or (h.unknown is not None and not h.effects and found[ranked[0]].effects)] + others  # fmt: skip
+        least = min([self._least(), *(h.left for h in others)])
+        return replace(self.linear, hypotheses=normalised(forgive(kept, self.nothing, least), 0.0))
 
 
-def _inherited(found: Sequence[Hypothesis], before: Sequence[Hypothesis], points: Iterable[int]) -> list[Hypothesis]:
-    """Sets that were not flown, corrected by as much as the largest flown set within them was.
+def _beside(h: Hypothesis, known: Hypothesis, fits: Sequence[UnknownFit], flying: Flying) -> Hypothesis:
+    """Something unknown beside a set (or alone), as what the set leaves where it was flown has it."""
+    best = max(fits, key=lambda u: u.log_evidence)
+    more = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
+    weights = {t.row: best.weights[1 + j] for j, t in enumerate(flying.candidates.terms) if 1 + j in best.weights}
+    return replace(h, fit=known.fit, unknown=replace(best, weights=weights), log_evidence=known.log_evidence + more)
+
+
+def _inherited(found: Sequence[Hypothesis], before: Sequence[Hypothesis], bases: Iterable[int],
+               points: Iterable[int]) -> list[Hypothesis]:
+    """Sets that were not flown, corrected by as much as the largest set within them was that was.
 
     What polynomials in its size miss of an effect they miss in every set that holds it; else the sets that nobody has
     flown yet would always look best.
     """
-    flown, out = [j for j in points if found[j].effects], list(found)
+    flown, out = [j for j in bases if found[j].effects], list(found)
     for i, h in enumerate(before):
         within = [j for j in flown if set(before[j].effects) <= set(h.effects)]
-        if i in flown or not within:
+        if i in points or not within:
             continue
         nearest = max(within, key=lambda j: len(before[j].effects))
         now, then = found[nearest], before[nearest]
         more = now.fit.misfit - then.fit.misfit
         form, unknown = h.form, h.unknown
         if form is not None:
-            form = _moved(form, now.form, then.form, more)
+            form = _moved(form, now, then, h.fit.misfit + more)
         if unknown is not None:
             unknown = replace(unknown, misfit=unknown.misfit + more)
         out[i] = replace(h, fit=replace(h.fit, misfit=h.fit.misfit + more), form=form, unknown=unknown,
@@ -130,126 +200,15 @@ def _inherited(found: Sequence[Hypothesis], before: Sequence[Hypothesis], points
     return out
 
 
-def _moved(form: Form, now: Form | None, then: Form | None, more: float) -> Form:
-    """A form corrected by as much as another was, or by `more` of whitened square where the two cannot be compared."""
-    if now is None or then is None or not len(form.gained) == len(now.gained) == len(then.gained):
+def _moved(form: Form, now: Hypothesis, then: Hypothesis, misfit: float) -> Form:
+    """A form corrected by as much as that of a set within was; `misfit` is what the larger set leaves now."""
+    more, one, other = now.fit.misfit - then.fit.misfit, now.form, then.form
+    if one is None or other is None or not len(form.gained) == len(one.gained) == len(other.gained):
         return Form(form.gained, tuple(left + more for left in form.left))
     ways = range(len(form.gained))
-    return Form(tuple(form.gained[k] + now.gained[k] - then.gained[k] for k in ways),
-                tuple(form.left[k] + now.left[k] - then.left[k] for k in ways))
-
-
-def _least(found: Sequence[Hypothesis], points: Iterable[int], noise: float) -> float:
-    """What noise alone would leave, as far as what was flown shows."""
-    return min([noise, *(found[i].left for i in points)])
-
-
-def _left_over(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
-               tempering: float, fit: SetFit, point: Point, terms: Sequence[Term]) -> FloatArray:
-    """Inner products of what a set leaves where it was flown (row 0) and generic terms, all else integrated out."""
-    k, n = len(point.sizes), len(point.nuisances)
-    first, count = 1 + k + n, len(terms)
-    steps = _steps(fit, point.sizes)
-    moved = tuple(replace(term, row=first + j) for j, term in enumerate(terms))
-    gram = np.zeros((first + count, first + count))
-    for flight, evidence in zip(flights, evidences, strict=True):
-        rows = _rows(flight, candidates, fit, point.sizes, steps, point.nuisances)
-        base = innovations(replace(flight, parameters=rows[:1]), rows[:1], evidence.gain.K)[:, 0]
-        pushed = pushes(replace(flight, measured=predicted(flight, base)), moved)
-        rows = np.concatenate([rows, np.repeat(rows[:1], count)])
-        gram += compare(flight, rows, pushed, evidence.gain, evidence.factor, moved).gram / tempering
-    gram[first - n : first, first - n : first] += baseline.precision
-    gram[first - n : first, 0] += baseline.precision @ point.nuisances
-    gram[0, first - n : first] = gram[first - n : first, 0]
-    gram[0, 0] += point.nuisances @ baseline.precision @ point.nuisances
-    gone = np.arange(1, first)
-    inner = gram[np.ix_(gone, gone)] + 1e-2 * np.diag(np.arange(first - 1) < k)
-    reduced = gram - gram[:, gone] @ np.linalg.solve(inner, gram[gone])
-    kept = np.concatenate([[0], np.arange(first, first + count)])
-    return np.asarray(reduced[np.ix_(kept, kept)])
-
-
-def _beside(candidates: Bank, posterior: Posterior, left: FloatArray, known: Hypothesis,
-            others: Sequence[Hypothesis]) -> tuple[UnknownFit | None, list[Hypothesis]]:
-    """Terms of a set's own form, and the unknown beside it (or alone), judged on what it leaves where it was flown."""
-    moved = tuple(replace(term, row=1 + j) for j, term in enumerate(candidates.terms))
-    own: UnknownFit | None = None
-    fits = fit_unknown(left, replace(candidates, terms=moved))
-    if known.effects:
-        own, fits = split(known.fit, posterior.reduced, fits)
-    if not fits:
-        return own, []
-    best = max(fits, key=lambda u: u.log_evidence)
-    add = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
-    weights = {t.row: best.weights[1 + j] for j, t in enumerate(candidates.terms) if 1 + j in best.weights}
-    return own, [replace(other, fit=known.fit, unknown=replace(best, weights=weights),
-                          log_evidence=known.log_evidence + add) for other in others]  # fmt: skip
-
-
-def _settle(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
-            tempering: float, fit: SetFit, centre: FloatArray) -> Point:
-    """Gauss-Newton from a set's linear fit, or the published model if that is nearer; a step that fails is halved."""
-    def fly(sizes: FloatArray, nuisances: FloatArray) -> Point:
-        return _point(flights, candidates, evidences, baseline, tempering, fit, sizes, nuisances)
-
-    low, high = (np.array([getattr(f.parameter, end) for f in fit.families]) for end in ("low", "high"))
-    starts = [fly(np.array(fit.estimate), at) for at in (np.clip(centre, -FARTHEST, FARTHEST), np.zeros_like(centre))]
-    best, share = min(starts, key=lambda point: point.cost), 1.0
-    for _ in range(ROUNDS):
-        step = -share * np.linalg.solve(best.information, best.slope)
-        if -0.5 * float(step @ best.slope) < SETTLED:
-            break
-        k = len(low)
-        sizes = np.clip(best.sizes + step[:k] * (high - low), low, high)
-        tried = fly(sizes, np.clip(best.nuisances + step[k:], -FARTHEST, FARTHEST))
-        best, share = (tried, 1.0) if tried.cost < best.cost else (best, 0.5 * share)
-    return best
-
-
-def _point(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
-           tempering: float, fit: SetFit, sizes: FloatArray, nuisances: FloatArray) -> Point:
-    k, n = len(sizes), len(nuisances)
-    steps = _steps(fit, sizes)
-    gram = np.zeros((1 + k + n, 1 + k + n))
-    for flight, evidence in zip(flights, evidences, strict=True):
-        rows = _rows(flight, candidates, fit, sizes, steps, nuisances)
-        gram += compare(flight, rows, (), evidence.gain, evidence.factor).gram / tempering
-    span = np.array([f.parameter.high - f.parameter.low for f in fit.families])
-    unit = np.concatenate([[1.0], span / steps if k else [], np.full(n, 1.0 / NUISANCE_STEP)])
-    gram = gram * unit[:, None] * unit
-    prior = baseline.precision
-    slope, information = gram[1:, 0].copy(), gram[1:, 1:].copy()
-    slope[k:] += prior @ nuisances
-    information[k:, k:] += prior
-    information[:k, :k] += np.eye(k)  # a size moves no farther than its range
-    cost = 0.5 * (gram[0, 0] + nuisances @ prior @ nuisances)
-    return Point(sizes, nuisances, float(cost), slope, information)
-
-
-def _steps(fit: SetFit, sizes: FloatArray) -> FloatArray:
-    """Step of each size for its slope: about its uncertainty, inwards."""
-    out = np.zeros(len(sizes))
-    for m, (family, size) in enumerate(zip(fit.families, sizes, strict=True)):
-        low, high = family.parameter.low, family.parameter.high
-        spread = 0.0 if fit.covariance is None else float(np.sqrt(fit.covariance[m, m]))
-        step = min(max(spread, 1e-3 * (high - low)), 0.1 * (high - low))
-        out[m] = step if size + step <= high else -step
-    return out
-
-
-def _rows(flight: Reconstruction, candidates: Bank, fit: SetFit, sizes: FloatArray, steps: FloatArray,
-          nuisances: FloatArray) -> NDArray:
-    """PARAMETERS: the set where it is fitted, then a step of each size, then a step of each nuisance."""
-    k, n = len(sizes), len(nuisances)
-    rows = np.repeat(flight.parameters, 1 + k + n)
-    for j, (direction, size) in enumerate(zip(candidates.nuisances, nuisances, strict=True)):
-        own = np.full(len(rows), size)
-        own[1 + k + j] += NUISANCE_STEP
-        direction.apply(rows, slice(None), flight.power_from, own)
-    moved = np.tile(sizes, (len(rows), 1))
-    moved[1 : 1 + k] += np.diag(steps)
-    return effects.with_effects(rows, {f.effect.name: {f.parameter.name: moved[:, m]}
-                                       for m, f in enumerate(fit.families)})  # fmt: skip
+    return Form(tuple(form.gained[k] + one.gained[k] - other.gained[k] for k in ways),
+                tuple(form.left[k] + one.left[k] - other.left[k] for k in ways),
+                max(one.foreign - max(now.fit.misfit - misfit, 0.0), 0.0))
 
 
 def _corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior) -> Hypothesis:

@@ -13,6 +13,7 @@ from sim2real.candidates import NUISANCE_STEP, Bank, shifted
 from sim2real.evidence import SIGMAS, Evidence, choose_gain, gather
 from sim2real.hypotheses import Hypothesis, Posterior, leaving_out, normalised
 from sim2real.kalman import Gain, gains
+from sim2real.points import Flying
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.refine import leading, refine
@@ -53,7 +54,7 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
         def start(known: Hypothesis) -> FloatArray:
             return centre + nuisance_mean(gram, candidates, known.weights)
 
-        posterior = refine(flights, candidates, evidences, baseline, start, posterior)
+        posterior = refine(Flying(flights, candidates, evidences, baseline, posterior.tempering), start, posterior)
     return evidences, replace(posterior, hypotheses=normalised(posterior.hypotheses))
 
 
