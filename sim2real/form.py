@@ -24,12 +24,13 @@ from sim2real.sets import SetFit
 from sim2real.terms import Term
 
 OTHER_FORM = 0.5  # prior probability that an effect has not the library's form (assumed)
-SHARES = (0.15, 0.4, 1.0)  # rho: what terms at home may take, over what the set explains; equally likely (assumed)
+# rho: what terms at home may take, over what the set explains; equally likely, the last for single effects (assumed)
+SHARES = (0.15, 0.4, 0.8)
 # Of its signature, that a set may leave over for no reason that anybody could name; and where a component that it does
 # not enter would be a reason (assumed).
 FORGIVEN, LEAK = 0.3, 0.04
 DIRECTIONS = 10.0  # in which such a remainder lies (assumed)
-MOSTLY = 0.5  # of what generic terms explain: an effect that explains more of it is what they are (assumed)
+MOSTLY = 0.6  # of what generic terms explain: an effect that explains more of it is what they are (assumed)
 LEAST = 3.0  # whitened size of a set's signature below which its form does not matter
 # Generic terms by which an effect that enters at a component may differ from the library's.
 ALIKE = {
@@ -78,7 +79,8 @@ def forgiven(left: float, explained: float, foreign: float = 0.0) -> float:
     """
     left, explained = max(left, 0.0), max(explained, 0.0)
     elsewhere = min(max(foreign, 0.0), left)
-    most = min(left - elsewhere, FORGIVEN**2 * explained) + min(elsewhere, LEAK**2 * explained)
+    leaked = min(elsewhere, LEAK**2 * explained)
+    most = leaked + min(left - elsewhere, FORGIVEN**2 * explained - leaked)
     return float(0.5 * most - 0.5 * DIRECTIONS * np.log1p(most / DIRECTIONS))
 
 
@@ -131,7 +133,13 @@ def without(gram: FloatArray, first: int) -> tuple[FloatArray, FloatArray]:
     return inner, onto
 
 
-def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float) -> Form:
+def shares(members: int) -> tuple[float, ...]:
+    """rho that a set may have: several effects with large remainders at home could be anything."""
+    return SHARES if members == 1 else SHARES[:-1]
+
+
+def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float,
+         rho: Sequence[float] = SHARES) -> Form:
     """What generic terms at home add to a set, averaged over the prior of another form.
 
     Args:
@@ -139,12 +147,13 @@ def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float)
         onto: of the terms with what the set leaves over [m].
         square: of `room` [m].
         misfit: whitened square that the set leaves over.
+        rho: of `shares`.
     """
     used = np.flatnonzero((np.diag(inner) > 1e-9) & (square > 0.0))
     if not len(used):
         return Form((0.0,), (misfit,))
     logs, taken = [0.0], [0.0]
-    for share in SHARES:
+    for share in rho:
         most = share**2 * square[used]
         size = np.sqrt(most / np.diag(inner)[used])
         scaled = inner[np.ix_(used, used)] * size[:, None] * size
@@ -160,7 +169,8 @@ def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float)
 def is_own(fit: SetFit, reduced: FloatArray, unknown: UnknownFit) -> bool:
     """Whether what generic terms take beside a set is another form of its effects, by place and by size."""
     taken = fit.misfit - unknown.misfit
-    return at_home(unknown.component, fit.effects) and taken <= max(SHARES) ** 2 * _explained(fit, reduced)
+    most = max(shares(len(fit.families))) ** 2 * _explained(fit, reduced)
+    return at_home(unknown.component, fit.effects) and taken <= most
 
 
 def split(fit: SetFit, reduced: FloatArray, fits: Sequence[UnknownFit]) -> tuple[UnknownFit | None, list[UnknownFit]]:

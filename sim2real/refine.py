@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
-from sim2real.form import Form, at_home, gain, own_terms, room, split, with_terms
+from sim2real.form import Form, at_home, gain, own_terms, room, shares, split, with_terms
 from sim2real.generic import UnknownFit, fit_unknown
 from sim2real.hypotheses import Hypothesis, Posterior, forgive, normalised, pair_prior
 from sim2real.points import Flying, Point
@@ -93,7 +93,8 @@ class _Search:
         if h.effects:
             own = own_terms(h.effects, moved)
             rows = [term.row for term in own]
-            form = gain(left[np.ix_(rows, rows)], left[rows, 0], room(h.fit, self.linear.reduced, own), h.fit.misfit)
+            form = gain(left[np.ix_(rows, rows)], left[rows, 0], room(h.fit, self.linear.reduced, own), h.fit.misfit,
+                        shares(len(h.effects)))
             elsewhere = [u for u in self.generic[i] if u.log_evidence > 0.0 and not at_home(u.component, h.effects)]
             most = max((float(left[0, 0]) - u.misfit for u in elsewhere), default=0.0)
             h = replace(h, form=replace(form, foreign=most))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from icing_env import effects
 from sim2real.candidates import bank
-from sim2real.form import ALIKE, OTHER_FORM, SHARES, gain, own_terms, without
+from sim2real.form import ALIKE, DIRECTIONS, FORGIVEN, SHARES, Form, forgiven, gain, own_terms, without
 from sim2real.generic import fit_unknown
 from sim2real.terms import BEYOND, GENERIC, unit_of
 
@@ -28,15 +28,35 @@ def products(seed: int, left: float) -> np.ndarray:
 @given(st.integers(0, 100), st.floats(0.0, 200.0), st.floats(0.0, 1e4))
 def test_a_form_takes_no_more_than_its_share_of_the_effect(seed: int, left: float, energy: float) -> None:
     gram = products(seed, left)
-    found = gain(gram[1:, 1:], gram[1:, 0], (np.full(TERMS, energy / TERMS), np.zeros(TERMS)))
-    assert np.log(0.5 * (1.0 - OTHER_FORM)) - 1e-9 <= found <= 0.5 * max(SHARES) ** 2 * energy + 1e-9
+    misfit = float(gram[0, 0])
+    found = gain(gram[1:, 1:], gram[1:, 0], np.full(TERMS, energy / TERMS), misfit)
+    assert max(found.gained) <= 0.5 * max(SHARES) ** 2 * energy + 1e-9
+    assert misfit - max(SHARES) ** 2 * energy - 1e-9 <= found.least <= misfit + 1e-9
+    assert found.left[0] == misfit and found.gained[0] == pytest.approx(-np.log(len(found.gained)))
 
 
 def test_a_remainder_within_the_share_is_taken_and_costs_little() -> None:
     gram = products(1, 20.0)
-    found = gain(gram[1:, 1:], gram[1:, 0], (np.full(TERMS, 60.0**2 / TERMS), np.zeros(TERMS)))
-    assert 0.5 * 20.0**2 - 25.0 < found < 0.5 * 20.0**2
-    assert gain(gram[1:, 1:], gram[1:, 0], (np.zeros(TERMS), np.zeros(TERMS))) == 0.0
+    found = gain(gram[1:, 1:], gram[1:, 0], np.full(TERMS, 60.0**2 / TERMS), 20.0**2)
+    assert 0.5 * 20.0**2 - 25.0 < max(found.gained) < 0.5 * 20.0**2
+    assert found.least < 10.0
+    assert gain(gram[1:, 1:], gram[1:, 0], np.zeros(TERMS), 20.0**2) == Form((0.0,), (20.0**2,))
+
+
+@given(st.floats(0.0, 1e4), st.floats(0.0, 1e6), st.floats(0.0, 1e4), st.floats(0.0, 1e3))
+def test_what_is_forgiven_never_exceeds_what_is_left_nor_its_share(left, explained, foreign, more):
+    got = forgiven(left, explained, foreign)
+    assert -1e-9 <= got <= 0.5 * min(left, FORGIVEN**2 * explained) + 1e-9
+    assert forgiven(left, explained, foreign + more) <= got + 1e-9  # a reason elsewhere is no excuse
+    assert 0.5 * (left + more) - forgiven(left + more, explained, foreign) >= 0.5 * left - got - 1e-6  # less is better
+
+
+def test_a_small_remainder_is_not_forgiven_and_a_large_one_costs_its_logarithm():
+    assert forgiven(2.0, 1e6) < 0.1
+    costs = [0.5 * left - forgiven(left, 1e6) for left in (100.0, 1000.0, 10000.0)]
+    assert costs == pytest.approx([0.5 * DIRECTIONS * np.log1p(left / DIRECTIONS) for left in (100, 1000, 10000)])
+    assert forgiven(1000.0, 1e6, 1000.0) == forgiven(1000.0, 1e6)  # within the leak
+    assert forgiven(1000.0, 1e4, 1000.0) < 10.0
 
 
 def test_sizes_give_way_before_a_form_is_judged() -> None:

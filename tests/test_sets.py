@@ -11,7 +11,7 @@ from sim2real.attribution import attribute, with_prior
 from sim2real.candidates import Bank, bank
 from sim2real.generic import beside
 from sim2real.hypotheses import Posterior
-from sim2real.sets import SetFit, descend, integrate, pairs
+from sim2real.sets import SetFit, descend, integrate, pairs, sizes_tried
 from sim2real.sizes import flown_weights, in_powers
 from sim2real.where import components
 
@@ -108,7 +108,7 @@ def test_a_pairs_evidence_is_the_integral_over_both_sizes():
     problem = in_powers(gram, candidates.families)
     names = [f.effect.name for f in candidates.families]
     members = (names.index("lift_slope"), names.index("alpha_bias"))
-    modes = pairs(problem, members)
+    modes = pairs(problem, members, sizes_tried(problem))
     fit = integrate(problem, modes, 0)
     x = [np.linspace(problem.low[m], problem.high[m], 1501) for m in members]
     a, b = (1 + m * problem.degree + np.arange(problem.degree) for m in members)

@@ -45,7 +45,8 @@ def test_tiers_gusts_forms_and_effects_are_all_drawn():
 def test_sizes_stay_within_what_the_protocol_allows():
     drawn = [part for d in draw.designs(2400, 1) if d.tier == "single" for part in d.parts]
     ratios = [abs(size / effects.BY_NAME[name].typical) for name, _, size in drawn]
-    assert min(ratios) >= 0.2 and max(ratios) <= 2.5
+    # beyond 1.5 only where the spread of derivatives or a near rival hides what is smaller
+    assert min(ratios) >= 0.2 and max(ratios) <= 3.1
     assert set(draw.LARGER) <= {e.name for e in effects.EFFECTS}
 
 
