@@ -21,6 +21,7 @@ from sim2real.evidence import Evidence
 from sim2real.hypotheses import P_NONE, P_UNKNOWN, Posterior
 from sim2real.ladder import ladder
 from sim2real.manoeuvre import next_manoeuvre
+from sim2real.paths import in_step
 from sim2real.reconstruct import Reconstruction, reconstruct
 from sim2real.references import Baseline, fit_baseline
 from sim2real.remedy import Remedy, leading, remedy, resimulation, values_of
@@ -146,6 +147,7 @@ def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, s
                    ) -> list[Reconstruction]:  # fmt: skip
     """Records over the model that references corrected, or over a simulator of the user's so corrected."""
     flights = [reconstruct(record, None if baseline is None else baseline.near(record)) for record in records]
+    flights = in_step(flights)
     if simulator is None:
         return flights
     return [replace(flight, known=flying_as(reconstruct(record), simulator).known)

@@ -28,6 +28,8 @@ TIMING = 0.002  # s: command and position are no better in step, nor is the actu
 CORRELATED = 0.5  # s in which errors of a position's calibration and timing stay what they are (assumed)
 POWER_NOISE = 0.01  # of full power
 ACTUATOR = ("lag", "rate", "min", "max", "gearing", "offset")
+LAGS = np.array([-0.03, -0.015, 0.0, 0.015, 0.03, 0.06, 0.1, 0.15, 0.22, 0.3, 0.5])  # s, beside the published one
+LATER = 12.0  # whitened square that commands taken one sample later have to be better by (assumed)
 UNFILTERED = 1e6  # Hz: no low pass
 STILL_COMMAND, STILL_LEVER = 1e-4, 1e-3  # rad, 0..1: a command that moves less tests nothing
 
@@ -53,6 +55,38 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
             out.append(((measured[:, None] - np.column_stack([predicted, *added])) / noise[:, None],
                         rows + [term.row for term in own]))
     return out + _engine_residuals(flight, parameters)
+
+
+def in_step(flights: Sequence[Reconstruction]) -> list[Reconstruction]:
+    """Records with their commands one sample later, if positions follow them better so.
+
+    Whether a recorded command acts in the step that ends at its sample or in the one that begins there is a matter of
+    the recorder; taken the wrong way round, every actuator lags. Each way is judged at the lag that suits it best, and
+    every surface has to agree: one alone may have an effect.
+    """
+    later = [replace(f, commands={n: np.concatenate([c[:1], c[:-1]]) for n, c in f.commands.items()}) for f in flights]
+    better = _at_any_lag(flights) - _at_any_lag(later)
+    if np.sum(better) < LATER or np.min(better) < 0.0:
+        return list(flights)
+    return [replace(f, notes=(*f.notes, "commands taken one sample later: positions follow them better so"))
+            for f in later]
+
+
+def _at_any_lag(flights: Sequence[Reconstruction]) -> FloatArray:
+    """Whitened square of each surface's positions, with the lag that leaves least [3]; zero where nothing moved."""
+    total = np.zeros(len(SURFACES))
+    for j, surface in enumerate(SURFACES):
+        left = np.zeros(len(LAGS))
+        for flight in flights:
+            rows = np.repeat(flight.parameters, len(LAGS))
+            rows[f"{surface}_lag"] = np.maximum(rows[f"{surface}_lag"] + LAGS, 0.0)
+            only = replace(flight, commands={n: c for n, c in flight.commands.items() if n == f"{surface}_command"})
+            for residual, own in path_residuals(only, rows):
+                square = np.full(len(LAGS), np.sum(residual[:, 0] ** 2))
+                square[own] = np.sum(residual**2, axis=0)
+                left += square
+        total[j] = left.min()
+    return total
 
 
 def _differing(parameters: NDArray, names: list[str]) -> list[int]:

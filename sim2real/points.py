@@ -21,6 +21,7 @@ from sim2real.terms import pushes
 
 ROUNDS = 4
 SETTLED = 0.2  # gain of half the whitened square that is worth another round
+FAR = 1000.0  # whitened square above the linear fit's that makes another start worth a flight
 FARTHEST = 15.0  # standard deviations of a nuisance: its prior counts, and what is beyond may not fly
 
 
@@ -49,12 +50,16 @@ class Flying:
     baseline: Baseline
     tempering: float
 
-    def settle(self, fit: SetFit, *starts: FloatArray) -> Point:
-        """Gauss-Newton on sizes and nuisances from the best of `starts` [n]; a step that does not help is halved."""
+    def settle(self, fit: SetFit, start: FloatArray) -> Point:
+        """Gauss-Newton on sizes and nuisances, from nuisances `start` [n]; a step that does not help is halved.
+
+        Where that is far worse than the linear fit had it, from the published model if that is nearer.
+        """
         low, high = (np.array([getattr(f.parameter, end) for f in fit.families]) for end in ("low", "high"))
         at = np.array(fit.estimate)
-        best, share = min((self.point(fit, at, np.clip(start, -FARTHEST, FARTHEST)) for start in starts),
-                          key=lambda point: point.cost), 1.0  # fmt: skip
+        best, share = self.point(fit, at, np.clip(start, -FARTHEST, FARTHEST)), 1.0
+        if 2.0 * best.cost > fit.misfit + FAR:
+            best = min(best, self.point(fit, at, np.zeros_like(start)), key=lambda point: point.cost)
         for _ in range(ROUNDS):
             step = -share * np.linalg.solve(best.information, best.slope)
             if -0.5 * float(step @ best.slope) < SETTLED:

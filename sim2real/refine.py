@@ -23,10 +23,10 @@ from sim2real.sets import Modes, SetFit, integrate
 from sim2real.singles import EffectFit, fit_family
 from sim2real.sizes import in_powers
 
-LEADING, LIKELY = 3, 0.02  # explanations that are flown again, and how probable they have to be
+LEADING, LIKELY = 2, 0.02  # explanations that are flown again, and how probable they have to be
 CERTAIN = 0.05  # probability of no gap above which nothing is: sizes near zero have no likelihood of Gaussian shape
-MOST = 10  # explanations flown again; what looks better then and has not been flown is not believed
-COMPANIONS, WORTH = 3, 3.0  # effects flown beside the best single one, and the log evidence that they have to add
+MOST = 8  # explanations flown again; what looks better then and has not been flown is not believed
+COMPANIONS, WORTH = 2, 5.0  # effects flown beside the best single one, and the log evidence that they have to add
 
 
 def leading(posterior: Posterior) -> list[Hypothesis]:
@@ -84,7 +84,7 @@ class _Search:
 
     def _fly(self, i: int) -> None:
         h = self.found[i]
-        self.points[i] = self.flying.settle(h.fit, self.start(h), np.zeros(len(self.flying.candidates.nuisances)))
+        self.points[i] = self.flying.settle(h.fit, self.start(h))
         h = _corrected(h, self.points[i], self.linear)
         left = self.flying.left_over(h.fit, self.points[i])
         bank = self.flying.candidates
