@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,12 +12,13 @@ from icing_env import scenario
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, RecordMeta, write
 from sim2real import gap
-from sim2real.candidates import bank, nodes, nuisances
+from sim2real.candidates import bank, nodes, nuisances, unbroken
 from sim2real.diagnosis import Diagnosis, credible, diagnose
 from sim2real.kalman import gains, linearise
+from sim2real.paths import in_step
 from sim2real.predictor import innovations
 from sim2real.reconstruct import reconstruct, unfiltered
-from sim2real.sizes import size_prior
+from sim2real.sizes import piece_prior, size_prior
 from testbed.cli import _run
 from testbed.commands.diagnose import answer
 from testbed.flight import fly
@@ -45,7 +47,7 @@ def first(found: Diagnosis) -> list[str]:
 
 @pytest.mark.parametrize(("effect", "value"), [
     ("lift_slope:change", -0.25), ("alpha_bias:offset", 0.009), ("aileron_power:change", 0.25),
-    ("elevator_lag:extra", 0.1),
+    ("elevator_lag:extra", 0.1), ("elevator_rate_limit:reduction", 0.65),
 ])  # fmt: skip
 def test_an_injected_effect_is_found_with_its_size(effect, value):
     name, _, parameter = effect.partition(":")
@@ -197,6 +199,27 @@ def test_every_effect_has_sizes_to_try_inside_its_range():
         assert all(p.low <= s <= p.high and s != p.neutral for s in nodes(p))
         grid = np.linspace(p.low, p.high, 801)
         assert np.sum(size_prior(p, grid) * np.gradient(grid)) == pytest.approx(1.0, abs=1e-6)
+        assert all(p.low <= s <= p.high and s != p.neutral for s in family.nodes)
+
+
+def test_pieces_of_a_range_cover_it_and_share_its_prior():
+    for whole in unbroken(bank().families):
+        parts = [f for f in bank().families if f.effect is whole.effect and f.parameter is whole.parameter]
+        parts.sort(key=lambda f: f.low)
+        assert (parts[0].low, parts[-1].high) == (whole.low, whole.high)
+        assert all(a.high == b.low for a, b in pairwise(parts))
+        grids = [np.linspace(f.low, f.high, 2001) for f in parts]
+        mass = sum(float(np.sum(piece_prior(f, g) * np.gradient(g))) for f, g in zip(parts, grids, strict=True))
+        assert mass == pytest.approx(1.0, abs=0.02)
+
+
+def test_commands_that_act_one_sample_later_are_put_in_step_and_one_lagging_surface_is_not():
+    asked = reconstruct(flown("elevator_lag:extra", 0.1))
+    assert in_step([asked])[0].commands["elevator_command"] is asked.commands["elevator_command"]
+    early = replace(asked, commands={n: np.concatenate([c[1:], c[-1:]]) for n, c in asked.commands.items()})
+    (found,) = in_step([early])
+    assert found.commands["elevator_command"][2:-2] == pytest.approx(asked.commands["elevator_command"][2:-2])
+    assert any("one sample later" in note for note in found.notes)
 
 
 def test_the_credible_set_is_the_smallest_that_holds_95_percent():

@@ -12,6 +12,7 @@ from icing_env import record
 from testbed.withheld import draw, effects, files, flights, generate, separation, unknown
 from testbed.withheld.manoeuvres import PLANS
 from testbed.withheld.numbers import airframe
+from testbed.withheld.shadow import shadow
 
 NULL = draw.Design("null", (), 0, 1.0, 0.5, 1.3, 1.0, {}, 7)
 
@@ -75,6 +76,24 @@ def test_every_effect_does_something_in_each_of_its_forms(pool, shape):
             assert found.none > 0.5, (effect.name, form)
             if form == "same" and effect.name in found.rivals:
                 assert found.rivals[effect.name] < 0.1 * found.none + 0.2, effect.name
+
+
+@pytest.mark.parametrize(("effect", "size"), [("roll_damping", -0.3), ("elevator_power", 0.25), ("side_force", 0.5)])
+def test_a_derivative_stands_no_farther_from_none_than_its_spread_allows(effect, size, shape):
+    """An aircraft with that derivative off by as much is a null of just that prior probability."""
+    none = separation.distances(0, 1.0, shape, ((effect, "same", size),)).none
+    assert 0.5 * abs(size) / draw.SPREAD < none < 1.02 * abs(size) / draw.SPREAD
+
+
+def test_departures_along_the_published_flight_are_in_proportion_and_vanish_with_the_effect():
+    """A trim that rolls the aircraft over within the manoeuvre leaves what twice as much of it would, halved."""
+    still = flights.fly(flights.Aircraft(), PLANS[0][0])
+    y0, u0, _ = shadow(flights.Aircraft(), still, PLANS[0][0].speed)
+    assert np.abs(y0).max() < 1e-6 and np.abs(u0).max() < 1e-6
+    once, twice = (shadow(flights.Aircraft(parts=(("roll_trim", "same", size),)), still, PLANS[0][0].speed)[0][:, 3]
+                   for size in (0.002, 0.004))  # fmt: skip
+    assert np.abs(once).max() > 1e-3
+    assert twice == pytest.approx(2.0 * once, rel=0.02, abs=1e-5)
 
 
 def test_forms_called_other_are_other():
