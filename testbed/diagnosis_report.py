@@ -37,7 +37,7 @@ def write_report(found: Diagnosis, result: Mapping[str, Any], folder: Path) -> P
 
 def build(found: Diagnosis, result: Mapping[str, Any]) -> Report:
     """The report: verdict, evidence, where, how far the gap closes, what could have been seen."""
-    report = Report("Diagnosis of a sim-to-real gap", sentences(found)[0],
+    report = Report("Diagnosis of a sim-to-real gap", _of_what(found),
                     {"sources": str(found.provenance["sources"]), "seed": str(found.provenance["seed"])})
     report.section("Verdict")
     report.verdict(sentences(found)[0], KIND[found.verdict])
@@ -50,6 +50,16 @@ def build(found: Diagnosis, result: Mapping[str, Any]) -> Report:
     return report
 
 
+def _of_what(found: Diagnosis) -> str:
+    """Records, their length and the gusts they were flown in."""
+    flights, held_out = found.details.flights, found.details.held_out
+    seconds = sum(len(f.time) * f.dt for f in flights)
+    gusts = sorted({round(e.sigma_w, 2) for e in found.details.evidences})
+    told = f"{gusts[0]:g} m/s" if len(gusts) == 1 else f"{gusts[0]:g} to {gusts[-1]:g} m/s"
+    more = f", {len(held_out)} held out" if held_out else ""
+    return f"{len(flights)} record{'s' * (len(flights) != 1)} of {seconds:.0f} s in all, gusts of {told}{more}"
+
+
 def _explanations(report: Report, result: Mapping[str, Any]) -> None:
     report.section("Explanations")
     shown = [h for h in result["hypotheses"] if h["probability"] >= 1e-3][:12] or result["hypotheses"][:1]
@@ -58,11 +68,11 @@ def _explanations(report: Report, result: Mapping[str, Any]) -> None:
     rows: list[list[Any]] = []
     for effect in result["effects"]:
         for name, p in effect["parameters"].items():
-            rows.append([effect["name"], effect["probability"], name, p["estimate"], p["low95"], p["high95"], p["unit"],
-                         _listed(effect["indistinguishable_from"])])
+            rows.append([effect["name"], effect["probability"], f"{name} [{p['unit']}]", p["estimate"],
+                         f"{p['low95']:.4g} to {p['high95']:.4g}", _listed(effect["indistinguishable_from"])])
     if rows:
-        report.table(["effect", "probability", "parameter", "estimate", "low 95 %", "high 95 %", "unit",
-                      "cannot be told from"], rows, "Effects that these records leave possible.")
+        report.table(["effect", "probability", "parameter", "estimate", "95 %", "cannot be told from"], rows,
+                     "Effects that these records leave possible.")
     if result["unknown"]:
         unknown = result["unknown"]
         report.table(["term", "coefficient", "standard error"],
@@ -139,7 +149,7 @@ def _limits(report: Report, result: Mapping[str, Any]) -> None:
 
 def _label(hypothesis: Mapping[str, Any]) -> str:
     if hypothesis["effects"]:
-        return ", ".join(hypothesis["effects"])
+        return " + ".join([*hypothesis["effects"], *["something unknown"] * hypothesis["unknown"]])
     return "nothing in the library" if hypothesis["unknown"] else "no gap"
 
 
