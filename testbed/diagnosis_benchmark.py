@@ -60,7 +60,7 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
         _solve(out, "answers_without", {name: ((effect,),) for name, effect in removed.items()}, workers, progress)
     refly(out / "answers", out / "keys", out / "refly", workers, progress)
     progress("scoring")
-    there = [out / f"answers_{rival}" for rival in RIVALS if (out / f"answers_{rival}").is_dir()]
+    there = [out / f"answers_{rival}" for rival in RIVALS if any((out / f"answers_{rival}").glob("*.json"))]
     found = score(out / "answers", out / "keys", out / "refly", out / "answers_without", *there)
     return found | {"set": "development" if seed is not None else "sealed",
                     "sources": committed["sources"]}  # fmt: skip
