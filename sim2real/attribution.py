@@ -30,6 +30,7 @@ from sim2real.hypotheses import (
     forgive,
     homes,
     normalised,
+    pair_prior,
 )
 from sim2real.sets import INTEGRATED, SetFit, grow, integrate, pairs, sizes_tried
 from sim2real.singles import EffectFit, ambiguity, fit_family
@@ -143,9 +144,9 @@ def _several(reduced: FloatArray, bank: Bank, testable: list[int]) -> list[Hypot
     two = pairs(problem, testable, grid)
     three = grow(problem, two, testable, grid)
     out = []
-    for modes, prior, count in ((two, P_PAIRS, n * (n - 1) / 2), (three, P_TRIPLES, n * (n - 1) * (n - 2) / 6)):
+    for modes, log_prior in ((two, pair_prior(n)), (three, float(np.log(P_TRIPLES / (n * (n - 1) * (n - 2) / 6))))):
         best = np.argsort(-modes.log)[:INTEGRATED]
-        out += _merged([integrate(problem, modes, int(i)) for i in best], float(np.log(prior / count)))
+        out += _merged([integrate(problem, modes, int(i)) for i in best], log_prior)
     return out
 
 

@@ -12,6 +12,7 @@ from scipy.special import expit, softmax
 
 from icing_env import effects
 from icing_env.effects import Parameter
+from sim2real.diagnosis import credible
 
 FAINTEST = 1e-6  # probability that nothing named falls below: what a rival rules out it may be wrong about (assumed)
 DESCRIBED = 0.01  # effects at least this probable are described, as in `icing diagnose`
@@ -81,12 +82,11 @@ def answer(told: Opinion, scale: Scale, seconds: float) -> dict[str, Any]:
     for name in filter(None, names):
         for component in effects.LIBRARY[name].enters_at:
             components[component] = min(components.get(component, 0.0) + p[name], 1.0)
-    within = int(np.searchsorted(np.cumsum([p[name] for name in names]), 0.95)) + 1
     return {
         "verdict": "no_gap" if p[""] >= 0.5 else "explained",
         "hypotheses": [{"effects": [name] if name else [], "unknown": False, "probability": p[name]}
                        for name in names],
-        "credible_set_95": list(range(min(within, len(names)))),
+        "credible_set_95": credible([p[name] for name in names]),
         "where": {"components": components},
         "effects": [_described(name, p[name], told.sizes[name]) for name in names if name and p[name] >= DESCRIBED],
         "gap": {"held_out": {"closure": None}},

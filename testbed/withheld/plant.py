@@ -198,6 +198,16 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
 
 
 @njit(cache=True)
+def glide(y: Any, p: Any, u: Any, t: float, h: float, d1: Any, d2: Any, d3: Any, o: Any) -> None:
+    """State `y` one step `h` on from time t, in still air; d1, d2, d3 and o are room to work in."""
+    still = np.zeros(4)
+    rates(y, p, u, still, t, d1, o)
+    rates(y + 0.5 * h * d1, p, u, still, t + 0.5 * h, d2, o)
+    rates(y + 0.75 * h * d2, p, u, still, t + 0.75 * h, d3, o)
+    y += h * (2.0 * d1 + 3.0 * d2 + 4.0 * d3) / 9.0
+
+
+@njit(cache=True)
 def fly(row: Any, y0: Any, u0: Any, plan: Any, hold: Any, gusts: Any) -> tuple[Any, Any, Any]:
     """Fly a manoeuvre with a mild pilot who holds attitude; commands change once per sample.
 

@@ -39,10 +39,7 @@ def _along(row: Any, Y: Any, C: Any, motion: Any, settle: int) -> tuple[Any, Any
         u[0] = C[max(k - delay, 0), 0]
         for s in range(pl.SUB):
             t = max((at - 1) * pl.SUB + s, 0) * h
-            pl.rates(y, p, u, still, t, d1, o)
-            pl.rates(y + 0.5 * h * d1, p, u, still, t + 0.5 * h, d2, o)
-            pl.rates(y + 0.75 * h * d2, p, u, still, t + 0.75 * h, d3, o)
-            y += h * (2.0 * d1 + 3.0 * d2 + 4.0 * d3) / 9.0
+            pl.glide(y, p, u, t, h, d1, d2, d3, o)
         for i in motion:
             if k > 0:
                 error[k, i] = y[i] - Y[k, i]

@@ -69,10 +69,7 @@ def _glide(row: Any, starts: Any, commands: Any, first: Any, steps: int) -> tupl
                 u[0] = commands[max(at - delay, 0), 0]
                 for s in range(SUB):
                     t = ((at - 1) * SUB + s) * h
-                    pl.rates(y, p, u, still, t, d1, o)
-                    pl.rates(y + 0.5 * h * d1, p, u, still, t + 0.5 * h, d2, o)
-                    pl.rates(y + 0.75 * h * d2, p, u, still, t + 0.75 * h, d3, o)
-                    y += h * (2.0 * d1 + 3.0 * d2 + 4.0 * d3) / 9.0
+                    pl.glide(y, p, u, t, h, d1, d2, d3, o)
             pl.rates(y, p, commands[at], still, at * pl.DT, d1, o)
             Y[i, k], out[i, k] = y, o
     return Y, out
