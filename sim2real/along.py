@@ -73,6 +73,9 @@ _FLAP_ASKED = int(columns(COMMAND, ("flap",))[0])
 _EFFICIENCY, _STATIC, _FACTOR_L, _FACTOR_R = (int(c) for c in columns(
     PARAMETERS, ("propeller_efficiency", "propeller_static_speed", "thrust_factor_left",
                  "thrust_factor_right")))  # fmt: skip
+_NORTH, _EAST, _DOWN, _NORTH_SHEAR, _EAST_SHEAR, _ABOVE = (int(c) for c in columns(
+    PARAMETERS, ("wind_north", "wind_east", "wind_down", "wind_north_shear", "wind_east_shear",
+                 "wind_reference_altitude")))  # fmt: skip
 _SCALE, _BIAS, _DRIFT = (int(c) for c in columns(
     PARAMETERS, ("scale_altitude", "bias_altitude", "drift_altitude")))  # fmt: skip
 _TIME, _ELAPSED = int(columns(MEASUREMENT, ("time",))[0]), int(columns(CURRENT, ("elapsed",))[0])
@@ -98,7 +101,11 @@ def read(out: Any, x: Any, y: Any, p: Any) -> None:
     for c in range(11):
         out[c] = y[_Y[c]]
     out[11] = (1.0 + p[_SCALE])*x[_ALTITUDE] + p[_BIAS] + p[_DRIFT]*y[_TIME]
-    per_power = p[_EFFICIENCY] / np.sqrt((x[_U] - x[_GUST_U])**2 + p[_STATIC]**2)
+    above = x[_ALTITUDE] - p[_ABOVE]
+    wind_u = ((p[_NORTH] + p[_NORTH_SHEAR]*above)*(x[_E0]**2 + x[_E1]**2 - x[_E2]**2 - x[_E3]**2)
+              + (p[_EAST] + p[_EAST_SHEAR]*above)*2.0*(x[_E1]*x[_E2] + x[_E0]*x[_E3])
+              + p[_DOWN]*2.0*(x[_E1]*x[_E3] - x[_E0]*x[_E2]))  # along body x
+    per_power = p[_EFFICIENCY] / np.sqrt((x[_U] - wind_u - x[_GUST_U])**2 + p[_STATIC]**2)
     out[12] = p[_FACTOR_L] * x[_POWER_L] * per_power
     out[13] = p[_FACTOR_R] * x[_POWER_R] * per_power
 

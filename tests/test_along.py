@@ -61,3 +61,16 @@ def test_a_row_flies_alone_as_in_a_batch(flight: Reconstruction) -> None:
         alone = innovations(flight, rows[row : row + 1], gain.K, own)
         np.testing.assert_array_equal(alone[:, 0], together[:, row])
     assert together.shape[2] == len(MEASURED)
+
+
+def test_thrust_is_read_through_the_wind(flight: Reconstruction) -> None:
+    """A steady wind shows nowhere: what the engines are said to push depends on the air, not on the ground."""
+    parameters = np.repeat(flight.parameters, 4)
+    parameters["wind_north"], parameters["wind_east"] = [0.0, 12.0, 0.0, -5.0], [0.0, 0.0, 9.0, 4.0]
+    parameters["wind_down"] = [0.0, -2.0, 1.0, 3.0]
+    flown = Predictor(flight, parameters)
+    flown.place(0)
+    np.testing.assert_allclose(flown.read(), np.repeat(flown.read()[:1], 4, axis=0), rtol=1e-12, atol=1e-9)
+    thrust = [MEASURED.index(f"thrust_{side}") for side in SIDES]
+    found = flown.fly(round(5.0 / flight.dt))[:, :, thrust]
+    np.testing.assert_allclose(found, np.repeat(found[:, :1], 4, axis=1), rtol=1e-3)  # a little: they climb apart
