@@ -63,17 +63,24 @@ def bounded(gain: float, x: float, reach: float) -> float:
 
 
 @njit(cache=True)
-def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
-    """Rates `d` of state `y` and outputs `o` under commands `u` and gusts `g` (u, v, w, w at the tail) at time t."""
-    density, lapse, gravity = air(y[H], p)
+def wind(y: Any, p: Any, t: float) -> tuple[float, float, float]:
+    """Steady wind along the body's axes at state `y` and time t, m/s."""
     sph, cph, sth, cth = math.sin(y[PHI]), math.cos(y[PHI]), math.sin(y[THETA]), math.cos(y[THETA])
     sps, cps = math.sin(y[PSI]), math.cos(y[PSI])
     above = y[H] - p.altitude_start
     north = p.shear * above + p.shear_bounded * 60.0 * math.tanh(above / 60.0)
     down = -p.wind_up - p.wind_wave * math.sin(2.0 * math.pi * t / 50.0)
-    ua = y[U] - north * cth * cps + down * sth - g[0]
-    va = y[V] - north * (sph * sth * cps - cph * sps) - down * sph * cth - g[1]
-    wa = y[W] - north * (cph * sth * cps + sph * sps) - down * cph * cth - g[2]
+    return (north * cth * cps - down * sth, north * (sph * sth * cps - cph * sps) + down * sph * cth,
+            north * (cph * sth * cps + sph * sps) + down * cph * cth)
+
+
+@njit(cache=True)
+def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
+    """Rates `d` of state `y` and outputs `o` under commands `u` and gusts `g` (u, v, w, w at the tail) at time t."""
+    density, lapse, gravity = air(y[H], p)
+    sph, cph, sth, cth = math.sin(y[PHI]), math.cos(y[PHI]), math.sin(y[THETA]), math.cos(y[THETA])
+    uw, vw, ww = wind(y, p, t)
+    ua, va, wa = y[U] - uw - g[0], y[V] - vw - g[1], y[W] - ww - g[2]
     plane = math.sqrt(ua * ua + wa * wa)
     V_ = math.sqrt(plane * plane + va * va)
     a, b = math.atan2(wa, ua), math.atan2(va, plane)

@@ -4,7 +4,8 @@ Two aircraft that fly the same commands drift apart, until they fly different ma
 longer small: a bank that has come to 40 degrees makes everything else look changed. What a filter that follows the
 record sees is smaller and simpler: from the published aircraft's state at one sample, the changed one arrives at the
 next with an error (its own surfaces, spools and lags running on). Those errors, passed through the linearised motion,
-are departures of the same innovations, and small as long as the change is.
+are departures of the same innovations, and small as long as the change is. A wind of its own carries the aircraft
+along: it flies through its air as the published one does, since what follows the record reads the airspeed.
 """
 
 from __future__ import annotations
@@ -27,12 +28,15 @@ SETTLE = 500  # samples that surfaces and spools get to settle at the first comm
 
 @njit(cache=True)
 def _along(row: Any, Y: Any, C: Any, motion: Any, settle: int) -> tuple[Any, Any, Any]:
-    """States [N, 27] with `motion` from Y and the rest its own, outputs [N, 9] there, errors of arrival [N, 27]."""
+    """States [N, 27] with `motion` from Y and the rest its own, outputs [N, 9] there, errors of arrival [N, 27].
+
+    Velocities are those of Y through the changed aircraft's own air.
+    """
     p = row[0]
     n, h, delay, still = len(Y), pl.DT / pl.SUB, round(row[0].elevator_delay / pl.DT), np.zeros(4)
     states, out, error = Y.copy(), np.zeros((n, pl.OUTPUTS)), np.zeros((n, pl.STATES))
     d1, d2, d3, o = np.zeros(pl.STATES), np.zeros(pl.STATES), np.zeros(pl.STATES), np.zeros(pl.OUTPUTS)
-    y, u = Y[0].copy(), C[0].copy()
+    y, u, carried = Y[0].copy(), C[0].copy(), np.zeros(pl.STATES)
     for k in range(-settle, n):
         at = max(k, 0)
         u[:] = C[at]
@@ -40,10 +44,11 @@ def _along(row: Any, Y: Any, C: Any, motion: Any, settle: int) -> tuple[Any, Any
         for s in range(pl.SUB):
             t = max((at - 1) * pl.SUB + s, 0) * h
             pl.glide(y, p, u, t, h, d1, d2, d3, o)
+        carried[pl.U], carried[pl.V], carried[pl.W] = pl.wind(Y[at], p, at * pl.DT)
         for i in motion:
             if k > 0:
-                error[k, i] = y[i] - Y[k, i]
-            y[i] = Y[at, i]
+                error[k, i] = y[i] - Y[k, i] - carried[i]
+            y[i] = Y[at, i] + carried[i]
         if k >= 0:
             pl.rates(y, p, u, still, k * pl.DT, d1, o)
             states[k], out[k] = y, o
