@@ -17,7 +17,7 @@ from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
 from sim2real.candidates import NUISANCE_STEP, Bank
-from sim2real.form import Form, gain, own_terms, room, shares, split, with_terms, without
+from sim2real.form import Form, gain, home, own_terms, room, split, with_terms, without
 from sim2real.generic import UnknownFit, beside, fit_unknown
 from sim2real.hypotheses import (
     P_BESIDE,
@@ -99,7 +99,7 @@ def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision
         found.append(Hypothesis(_alone(fits[name]), None, single, log))
     found += _several(reduced, bank, [i for i, f in enumerate(bank.families) if f in by_family])
     found = [replace(h, form=_form(reduced, bank, h.fit)) if h.effects else h for h in found]
-    found, unknown_fits = homes(found, fit_unknown(reduced, bank), float(reduced[0, 0]))
+    found, unknown_fits = homes(found, fit_unknown(reduced, bank), float(reduced[0, 0]), gram)
     least = min([h.left for h in found] + [u.misfit for u in unknown_fits] + [noise])
     found = forgive(found, float(reduced[0, 0]), least)
     few = [h for h in found if len(h.effects) <= MOST_BESIDE]
@@ -107,11 +107,12 @@ def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision
     if found[0] not in leading:
         leading.append(found[0])
     for known in leading:
-        home, beside_it = _with_unknown(reduced, bank, known, unknown_fits)
-        found[found.index(known)] = replace(known, form=with_terms(known.form, home))
+        at_home, beside_it = _with_unknown(reduced, gram, bank, known, unknown_fits)
+        found[found.index(known)] = replace(known, form=with_terms(known.form, at_home))
         found += beside_it
     kept = normalised(forgive(found, float(reduced[0, 0]), min(least, *(h.left for h in found))), 0.0)
-    return Posterior(kept, fits, unknown_fits, ambiguity(reduced, fits, _inclusion(kept)), reduced)
+    return Posterior(kept, fits, unknown_fits, ambiguity(reduced, fits, _inclusion(kept)), reduced,
+                     raw=gram)
 
 
 def _best(own: Sequence[EffectFit]) -> EffectFit:
@@ -171,18 +172,18 @@ def _form(reduced: FloatArray, bank: Bank, fit: SetFit) -> Form:
     for m, slope in enumerate(slopes):
         chosen[1 + m, list(slope)] = list(slope.values())
     chosen[range(first, len(chosen)), [term.row for term in terms]] = 1.0
-    return gain(*without(chosen @ reduced @ chosen.T, first), room(fit, reduced, terms), fit.misfit,
-                shares(len(fit.families)))
+    square = room(fit, reduced, terms, float(reduced[0, 0]))
+    return gain(*without(chosen @ reduced @ chosen.T, first), square, fit.misfit, len(home(fit.effects)))
 
 
-def _with_unknown(reduced: FloatArray, bank: Bank, known: Hypothesis,
+def _with_unknown(reduced: FloatArray, raw: FloatArray, bank: Bank, known: Hypothesis,
                   alone: Sequence[UnknownFit]) -> tuple[UnknownFit | None, list[Hypothesis]]:
     """An explanation with something unknown beside it (alone where it explains nothing), and terms of its form."""
     fits: list[UnknownFit] = list(alone)
     own: UnknownFit | None = None
     if known.effects:
         fits = fit_unknown(beside(reduced, bank, known.fit, _slopes(known.fit)), bank)
-        own, fits = split(known.fit, reduced, fits)
+        own, fits = split(known.fit, fits, float(reduced[0, 0]), raw)
     if not fits:
         return own, []
     best = max(fits, key=lambda u: u.log_evidence)

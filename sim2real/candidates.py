@@ -27,6 +27,7 @@ SPREAD, MASS_SPREAD = 0.05, 0.01
 THRUST_SPREAD = 0.3  # of thrust that was not recorded and is balanced against the model's own drag (assumed)
 FILTER_SPREAD, VANE_SPREAD = 0.1, 0.005  # of the recording's cut-off, and s: channels are in step to a few ms (assumed)
 VANE_SCALE = 0.015  # of a flow vane's reading, upwash included (assumed)
+LEAST = 0.1  # of a published value: a filter or a thrust with another sign does not fly
 NUISANCE_STEP = 1.0  # standard deviations at which the derivative with respect to a nuisance is taken
 
 
@@ -47,7 +48,8 @@ class Nuisance:
             return
         step = size * self.factor
         for name in self.parameter.split("+"):
-            rows[name][row] = rows[name][row] + step if self.absolute else rows[name][row] * (1.0 + step)
+            now = rows[name][row]
+            rows[name][row] = now + step if self.absolute else now * np.maximum(1.0 + step, LEAST)
 
 
 def shifted(parameters: NDArray, directions: tuple[Nuisance, ...], sizes: FloatArray, power_from: str) -> NDArray:

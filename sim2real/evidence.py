@@ -8,7 +8,7 @@ of several records add.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from icing_env.record import FloatArray
 from sim2real.candidates import Bank, parameter_rows
 from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR
 from sim2real.kalman import Gain, follow, gains
-from sim2real.paths import CORRELATED, path_residuals
+from sim2real.paths import counted, path_gram, path_residuals
 from sim2real.predictor import Push, held, innovations
 from sim2real.reconstruct import Reconstruction
 from sim2real.terms import Term, pushes
@@ -39,6 +39,7 @@ class Evidence:
         factor: whitens innovations [steps, channels, channels].
         samples: whitened numbers behind the inner products.
         whitened: [N, channels of MEASURED], v itself, for showing where the gap lies.
+        rows: [N x channels, rows] what is behind `gram` but for the paths, if it was kept; else empty.
     """
 
     gram: FloatArray
@@ -47,6 +48,7 @@ class Evidence:
     samples: int
     whitened: FloatArray
     flight: Reconstruction
+    rows: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def sigma_w(self) -> float:
@@ -69,11 +71,12 @@ def gather(flight: Reconstruction, bank: Bank, gain: Gain | None = None) -> Evid
 
 
 def compare(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain: Gain,
-            factor: FloatArray, terms: Sequence[Term] = ()) -> Evidence:
+            factor: FloatArray, terms: Sequence[Term] = (), keep: Sequence[int] = ()) -> Evidence:
     """Inner products of rows flown along one record, the first being the one that the others are compared with.
 
     Args:
         terms: generic ones, of which those of a path are judged there.
+        keep: rows that are wanted themselves.
     """
     moved = flown_rows(flight, rows, {q.row for q in pushed})
     index = {row: i for i, row in enumerate(moved)}
@@ -82,22 +85,23 @@ def compare(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gai
     first = round(SETTLE / flight.dt)
     flown, samples = np.zeros((len(moved), len(moved))), 0
     whitened = np.zeros((len(left), len(MEASURED)))
+    kept = np.zeros(((len(left) - first) * len(MEASURED), len(keep)))
+    at = [(i, index[row]) for i, row in enumerate(keep) if row in index]
     for k in range(first, len(left), CHUNK):
         part = np.clip(whiten(left[k : k + CHUNK], factor[k : k + CHUNK]), -FARTHEST, FARTHEST)
         whitened[k : k + CHUNK] = part[:, 0]
         samples += int(np.count_nonzero(part[:, 0]))
         flat = part.transpose(0, 2, 1).reshape(-1, len(moved))
-        flat = flat[np.any(flat != 0.0, axis=1)]  # a sparse channel's blanks
         flat[:, 1:] -= flat[:, :1]
+        for i, j in at:
+            kept[(k - first) * len(MEASURED) :][: len(flat), i] = flat[:, j]
+        flat = flat[np.any(flat != 0.0, axis=1)]  # a sparse channel's blanks
         flown += flat.T @ flat
     gram = np.zeros((len(rows), len(rows)))
     gram[np.ix_(moved, moved)] = flown
-    for path, own in path_residuals(flight, rows, terms):
-        path = path[first:].copy()
-        path[:, 1:] -= path[:, :1]
-        gram[np.ix_(own, own)] += path.T @ path
-        samples += round(len(path) * min(flight.dt / CORRELATED, 1.0))
-    return Evidence(gram, gain, factor, samples, whitened, flight)
+    gram += path_gram(flight, rows, terms, first)
+    samples += sum(counted(flight, len(flight.time) - first) for _ in path_residuals(flight, rows[:1]))
+    return Evidence(gram, gain, factor, samples, whitened, flight, kept)
 
 
 def flown_rows(flight: Reconstruction, rows: FloatArray, pushed: set[int]) -> list[int]:
@@ -106,12 +110,16 @@ def flown_rows(flight: Reconstruction, rows: FloatArray, pushed: set[int]) -> li
     return [j for j in range(len(rows)) if j == 0 or j in pushed or kept[j].tobytes() != kept[0].tobytes()]
 
 
-def choose_gain(flight: Reconstruction, options: list[Gain]) -> Gain:
+def choose_gain(flight: Reconstruction, options: list[Gain], pushed: Sequence[Push] = ()) -> Gain:
     """The gust intensity that makes the model's innovations likeliest.
 
     Their size is taken from medians: a gap that shows as an offset or in the moments of a manoeuvre is no gust.
+
+    Args:
+        pushed: generic discrepancies that the model is flown with, whatever their rows.
     """
-    left = innovations(flight, np.repeat(flight.parameters, len(options)), np.stack([g.K for g in options]))
+    everywhere = tuple(replace(push, row=i) for push in pushed for i in range(len(options)))
+    left = innovations(flight, np.repeat(flight.parameters, len(options)), np.stack([g.K for g in options]), everywhere)
     left = left[round(SETTLE / flight.dt) :]
     scores = []
     for i, gain in enumerate(options):

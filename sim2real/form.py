@@ -24,13 +24,14 @@ from sim2real.sets import SetFit
 from sim2real.terms import Term
 
 OTHER_FORM = 0.5  # prior probability that an effect has not the library's form (assumed)
-# rho: what terms at home may take, over what the set explains; equally likely, the last for single effects (assumed)
-SHARES = (0.15, 0.4, 0.8)
+# rho: what terms at home may take, over what the set explains; equally likely (assumed)
+SHARES = (0.15, 0.4, 1.0)
 # Of its signature, that a set may leave over for no reason that anybody could name; and where a component that it does
 # not enter would be a reason (assumed).
-FORGIVEN, LEAK = 0.3, 0.04
-DIRECTIONS = 10.0  # in which such a remainder lies (assumed)
-MOSTLY = 0.6  # of what generic terms explain: an effect that explains more of it is what they are (assumed)
+FORGIVEN, LEAK = 0.3, 0.005
+DIRECTIONS = 10.0  # in which such a remainder lies for every component at home (assumed)
+LUCK = 15.0  # whitened square that a free course at one component takes by luck (deviation of 120 knots' chance)
+MOSTLY = 0.5  # of what generic terms explain, or of their shape: an effect that is more of it is what they are
 LEAST = 3.0  # whitened size of a set's signature below which its form does not matter
 # Generic terms by which an effect that enters at a component may differ from the library's.
 ALIKE = {
@@ -45,49 +46,68 @@ ALIKE = {
 class Form:
     """A set in another form, by how much generic terms at home may take (nothing first).
 
-    gained: log evidence that they add, prior included; left: whitened square after them; foreign: as much of it as
-    generic terms of one component would explain where the set does not enter.
+    gained: log evidence that they add, prior included; left: whitened square after them; free: as much of the first of
+    these as a free course of time at home would take, beyond chance, and at how many components: at the home of each
+    member, then of all.
     """
 
     gained: tuple[float, ...]
     left: tuple[float, ...]
-    foreign: float = 0.0
+    free: tuple[tuple[float, int], ...] = ((np.inf, 1),)
 
     @property
     def least(self) -> float:
         """Whitened square left where the terms take most."""
         return min(self.left)
 
-    def regained(self, nothing: float, noise: float) -> float:
+    def regained(self, nothing: float, noise: float, bare: float = 0.0) -> float:
         """Log evidence of another form, with what is forgiven.
 
         Args:
             nothing: whitened square that no explanation leaves.
-            noise: that noise alone leaves.
+            noise: that the best one leaves.
+            bare: that the best one leaves beside free courses of time at home.
         """
-        return float(logsumexp([gained + forgiven(left - noise, nothing - left, self.foreign)
-                                for gained, left in zip(self.gained, self.left, strict=True)]))
+        return float(logsumexp([self.way(k, nothing, noise, bare) for k in range(len(self.gained))]))
+
+    def way(self, k: int, nothing: float, noise: float, bare: float) -> float:
+        """The same of one way, by how much the terms may take."""
+        left = self.left[k]
+        found = [forgiven(left - noise, nothing - left, max(self.left[0] - free - bare, 0.0), places)
+                 for free, places in self.free]
+        return self.gained[k] + float(logsumexp(found) - np.log(len(found)))
+
+    def bare(self) -> float:
+        """Whitened square that is left beside free courses of time, a little for luck."""
+        return min(self.left[0] - free + LUCK * places for free, places in self.free)
 
 
-def forgiven(left: float, explained: float, foreign: float = 0.0) -> float:
+def forgiven(left: float, explained: float, foreign: float = 0.0, places: int = 1) -> float:
     """Log evidence that a remainder regains where its scale is unknown.
 
     Args:
         left: whitened square above what noise leaves.
         explained: whitened square explained.
-        foreign: as much of `left` as generic terms of one component would explain where the set does not enter.
+        foreign: as much of `left` as could not come from where the set enters.
+        places: components at which it may lie.
     """
     left, explained = max(left, 0.0), max(explained, 0.0)
     elsewhere = min(max(foreign, 0.0), left)
     leaked = min(elsewhere, LEAK**2 * explained)
     most = leaked + min(left - elsewhere, FORGIVEN**2 * explained - leaked)
-    return float(0.5 * most - 0.5 * DIRECTIONS * np.log1p(most / DIRECTIONS))
+    directions = DIRECTIONS * places
+    return float(0.5 * most - 0.5 * directions * np.log1p(most / directions))
 
 
 def own_terms(names: Iterable[str], terms: Sequence[Term]) -> list[Term]:
     """Generic terms at the components where any of the effects enters."""
-    places = set().union(*(_places(name) for name in names))
+    places = home(names)
     return [term for term in terms if term.component in places]
+
+
+def home(names: Iterable[str]) -> set[str]:
+    """Components where any of the effects enters."""
+    return set().union(*(_places(name) for name in names))
 
 
 def at_home(component: str, names: Iterable[str]) -> bool:
@@ -95,20 +115,19 @@ def at_home(component: str, names: Iterable[str]) -> bool:
     return any(component in _places(name) for name in names)
 
 
-def _explained(fit: SetFit, reduced: FloatArray) -> float:
-    return max(float(reduced[0, 0]) - fit.misfit, 0.0)
-
-
 def _places(name: str) -> set[str]:
     return {c for at in effects.LIBRARY[name].enters_at for c in ALIKE.get(at, (at,))}
 
 
-def room(fit: SetFit, reduced: FloatArray, terms: Sequence[Term]) -> FloatArray:
+def room(fit: SetFit, reduced: FloatArray, terms: Sequence[Term], nothing: float) -> FloatArray:
     """Whitened square that each term may take where rho is one [terms].
 
     Every member shares the square of its own signature (no more than the set explains) among the terms where it enters.
+
+    Args:
+        nothing: whitened square that no explanation leaves.
     """
-    explained = _explained(fit, reduced)
+    explained = max(nothing - fit.misfit, 0.0)
     out = np.zeros(len(terms))
     for family in fit.families:
         rows = [row for row in family.rows if row in (fit.weights or {})]
@@ -133,13 +152,8 @@ def without(gram: FloatArray, first: int) -> tuple[FloatArray, FloatArray]:
     return inner, onto
 
 
-def shares(members: int) -> tuple[float, ...]:
-    """rho that a set may have: several effects with large remainders at home could be anything."""
-    return SHARES if members == 1 else SHARES[:-1]
-
-
 def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float,
-         rho: Sequence[float] = SHARES) -> Form:
+         places: int = 1) -> Form:
     """What generic terms at home add to a set, averaged over the prior of another form.
 
     Args:
@@ -147,13 +161,13 @@ def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float,
         onto: of the terms with what the set leaves over [m].
         square: of `room` [m].
         misfit: whitened square that the set leaves over.
-        rho: of `shares`.
+        places: components that are home.
     """
     used = np.flatnonzero((np.diag(inner) > 1e-9) & (square > 0.0))
     if not len(used):
-        return Form((0.0,), (misfit,))
+        return Form((0.0,), (misfit,), ((np.inf, places),))
     logs, taken = [0.0], [0.0]
-    for share in rho:
+    for share in SHARES:
         most = share**2 * square[used]
         size = np.sqrt(most / np.diag(inner)[used])
         scaled = inner[np.ix_(used, used)] * size[:, None] * size
@@ -163,19 +177,59 @@ def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float,
         # a Gaussian prior alone would not forbid a larger remainder
         logs.append(min(log, 0.5 * float(most.sum())))
         taken.append(min(float(2.0 * at @ along - at @ scaled @ at), float(most.sum())))
-    return Form(tuple(log - float(np.log(len(logs))) for log in logs), tuple(misfit - t for t in taken))
+    return Form(tuple(log - float(np.log(len(logs))) for log in logs), tuple(misfit - t for t in taken),
+                ((np.inf, places),))
 
 
-def is_own(fit: SetFit, reduced: FloatArray, unknown: UnknownFit) -> bool:
-    """Whether what generic terms take beside a set is another form of its effects, by place and by size."""
+def given(left: FloatArray, rows: Sequence[int], square: FloatArray, share: float) -> FloatArray:
+    """Inner products `left` after generic terms at `rows` have taken what `share` of the prior's allows them.
+
+    Args:
+        left: of what is left (row 0) and of generic terms.
+        square: of `room` [rows].
+    """
+    used = [(row, share**2 * s / left[row, row]) for row, s in zip(rows, square, strict=True)
+            if left[row, row] > 1e-9 and s > 0.0]  # fmt: skip
+    at, variance = [row for row, _ in used], np.array([v for _, v in used])
+    return np.asarray(left - left[:, at] @ np.linalg.solve(left[np.ix_(at, at)] + np.diag(1.0 / variance), left[at]))
+
+
+def alike(fit: SetFit, unknown: UnknownFit, raw: FloatArray) -> float:
+    """Squared cosine between what generic terms make of the records and an effect of a set that enters there.
+
+    Nuisances stay where they are: a moment that saturates with sideslip is first of all a moment of sideslip, even if
+    the linear part of it is within the model's own uncertainty.
+
+    Args:
+        raw: inner products of all rows of the bank.
+    """
+    found = [0.0]
+    for family in fit.families:
+        if at_home(unknown.component, (family.effect.name,)):
+            one = {row: w for row, w in (fit.weights or {}).items() if row in family.rows}
+            found.append(_cosine(one, unknown.weights, raw))
+    return max(found)
+
+
+def _cosine(one: dict[int, float], other: dict[int, float], raw: FloatArray) -> float:
+    rows = [*one, *other]
+    a, b = np.zeros(len(rows)), np.array([*([0.0] * len(one)), *other.values()])
+    a[: len(one)] = list(one.values())
+    inner = raw[np.ix_(rows, rows)]
+    return float((a @ inner @ b) ** 2 / max((a @ inner @ a) * (b @ inner @ b), 1e-30))
+
+
+def is_own(fit: SetFit, unknown: UnknownFit, nothing: float, raw: FloatArray) -> bool:
+    """Whether what generic terms take beside a set is another form of its effects, by place and by size or shape."""
     taken = fit.misfit - unknown.misfit
-    most = max(shares(len(fit.families))) ** 2 * _explained(fit, reduced)
-    return at_home(unknown.component, fit.effects) and taken <= most
+    most = max(SHARES) ** 2 * max(nothing - fit.misfit, 0.0)
+    return at_home(unknown.component, fit.effects) and (taken <= most or alike(fit, unknown, raw) > MOSTLY)
 
 
-def split(fit: SetFit, reduced: FloatArray, fits: Sequence[UnknownFit]) -> tuple[UnknownFit | None, list[UnknownFit]]:
+def split(fit: SetFit, fits: Sequence[UnknownFit], nothing: float,
+          raw: FloatArray) -> tuple[UnknownFit | None, list[UnknownFit]]:
     """The best of the generic fits beside a set that is its own form, and the fits that are not."""
-    own = [u for u in fits if is_own(fit, reduced, u)]
+    own = [u for u in fits if is_own(fit, u, nothing, raw)]
     return max(own, key=lambda u: u.log_evidence, default=None), [u for u in fits if u not in own]
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
-from sim2real.form import MOSTLY, OTHER_FORM, SHARES, Form, at_home, forgiven
+from sim2real.form import MOSTLY, OTHER_FORM, SHARES, Form, alike, at_home, forgiven
 from sim2real.generic import UnknownFit
 from sim2real.sets import SetFit
 from sim2real.singles import EffectFit
@@ -70,6 +70,9 @@ class Posterior:
         classes: effects that one effect cannot be told from.
         reduced: inner products, nuisances integrated out.
         tempering: what the evidence was divided by.
+        raw: inner products of all rows, nuisances where they are.
+        bare: whitened square that is left where the best flown set may do whatever it likes at home.
+        settled: nuisances [n] where the best flown set settled, if any was flown.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -78,6 +81,9 @@ class Posterior:
     classes: dict[str, tuple[str, ...]]
     reduced: FloatArray
     tempering: float = 1.0
+    raw: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    bare: float = np.inf
+    settled: FloatArray | None = None
 
     @property
     def none(self) -> float:
@@ -119,8 +125,8 @@ def pair_prior(effects: int) -> float:
     return float(np.log(P_PAIRS / (effects * (effects - 1) / 2)))
 
 
-def homes(found: Sequence[Hypothesis], alone: Sequence[UnknownFit],
-          nothing: float) -> tuple[list[Hypothesis], tuple[UnknownFit, ...]]:
+def homes(found: Sequence[Hypothesis], alone: Sequence[UnknownFit], nothing: float,
+          raw: FloatArray) -> tuple[list[Hypothesis], tuple[UnknownFit, ...]]:
     """Generic terms where a single effect of the library says most of the same are that effect in another form.
 
     Returns:
@@ -128,9 +134,7 @@ def homes(found: Sequence[Hypothesis], alone: Sequence[UnknownFit],
     """
     out, left = list(found), []
     for u in alone:
-        told = nothing - u.misfit
-        near = [i for i, h in enumerate(out) if len(h.effects) == 1 and at_home(u.component, h.effects)
-                and told > 0.0 and nothing - h.fit.misfit > MOSTLY * told]
+        near = [i for i, h in enumerate(out) if is_home(h, u, nothing, raw)]
         if not near:
             left.append(u)
             continue
@@ -140,22 +144,31 @@ def homes(found: Sequence[Hypothesis], alone: Sequence[UnknownFit],
     return out, tuple(left)
 
 
-def forgive(found: Sequence[Hypothesis], nothing: float, least: float) -> list[Hypothesis]:
+def is_home(h: Hypothesis, unknown: UnknownFit, nothing: float, raw: FloatArray) -> bool:
+    """Whether a single effect that enters where generic terms do says most of what they say, or the like of it."""
+    if len(h.effects) != 1 or h.unknown is not None or not at_home(unknown.component, h.effects):
+        return False
+    told = nothing - unknown.misfit
+    return told > 0.0 and (nothing - h.fit.misfit > MOSTLY * told or alike(h.fit, unknown, raw) > MOSTLY)
+
+
+def forgive(found: Sequence[Hypothesis], nothing: float, least: float, bare: float = 0.0) -> list[Hypothesis]:
     """Hypotheses with what another form, and a remainder that is forgiven, regain.
 
     Args:
         nothing: whitened square that no explanation at all leaves.
         least: what noise alone would leave.
+        bare: the same beside free courses of time, where these are known.
     """
-    return [replace(h, regained=_regained(h, nothing, least)) for h in found]
+    return [replace(h, regained=_regained(h, nothing, least, bare)) for h in found]
 
 
-def _regained(h: Hypothesis, nothing: float, least: float) -> float:
-    if h.unknown is not None:
-        return forgiven(h.left - least, nothing - h.left)
+def _regained(h: Hypothesis, nothing: float, least: float, bare: float) -> float:
     if h.form is None:
-        return 0.0
-    other = h.form.regained(nothing, least)
+        return 0.0 if h.unknown is None else forgiven(h.left - least, nothing - h.left)
+    if h.unknown is not None:
+        return h.form.regained(nothing, least, bare)
+    other = h.form.regained(nothing, least, bare)
     if h.instead is not None:
         left = h.instead.misfit
         alone = h.instead.log_evidence - h.log_evidence + forgiven(left - least, nothing - left)
@@ -171,7 +184,7 @@ def normalised(found: Sequence[Hypothesis], least: float = KEPT) -> tuple[Hypoth
     keep = [i for i in range(len(found)) if share[i] >= least or always[i]]
     total = float(share[keep].sum())
     out = [replace(found[i], probability=float(share[i]) / total) for i in keep]
-    return tuple(sorted(out, key=lambda h: -h.probability))
+    return tuple(sorted(out, key=lambda h: -h.log_posterior))
 
 
 def leaving_out(posterior: Posterior, names: Sequence[str]) -> Posterior:

@@ -27,6 +27,7 @@ POSITION_NOISE = 5.2e-4  # rad, the least believed (0.03 deg)
 TIMING = 0.002  # s: command and position are no better in step, nor is the actuator exactly of first order (assumed)
 CORRELATED = 0.5  # s in which errors of a position's calibration and timing stay what they are (assumed)
 POWER_NOISE = 0.01  # of full power
+PATHS = (*(f"{surface}_path" for surface in SURFACES), "propulsion")  # components; the last has more than its path
 ACTUATOR = ("lag", "rate", "min", "max", "gearing", "offset")
 LAGS = np.array([-0.03, -0.015, 0.0, 0.015, 0.03, 0.06, 0.1, 0.15, 0.22, 0.3, 0.5])  # s, beside the published one
 LATER = 12.0  # whitened square that commands taken one sample later have to be better by (assumed)
@@ -55,6 +56,37 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
             out.append(((measured[:, None] - np.column_stack([predicted, *added])) / noise[:, None],
                         rows + [term.row for term in own]))
     return out + _engine_residuals(flight, parameters)
+
+
+def of_paths(flight: Reconstruction, components: Collection[str]) -> Reconstruction:
+    """The record with the commands of some components ("elevator_path", "propulsion") alone."""
+    kept = tuple("throttle" if c == "propulsion" else c.removesuffix("_path") for c in components if c in PATHS)
+    return replace(flight, commands={n: c for n, c in flight.commands.items() if n.startswith(kept)} if kept else {})
+
+
+def path_gram(flight: Reconstruction, parameters: NDArray, terms: Sequence[Term] = (), first: int = 0) -> FloatArray:
+    """Inner products [rows, rows] of `path_residuals` from sample `first` on; rows but the first as departures."""
+    gram = np.zeros((len(parameters), len(parameters)))
+    for path, own in path_residuals(flight, parameters, terms):
+        path = path[first:].copy()
+        path[:, 1:] -= path[:, :1]
+        gram[np.ix_(own, own)] += path.T @ path
+    return gram
+
+
+def excess(flight: Reconstruction, parameters: NDArray, component: str) -> float:
+    """Whitened square above noise that the paths of a component leave: as much as any course of it would take.
+
+    Args:
+        parameters: one PARAMETERS row.
+    """
+    return sum(float(np.sum(residual[:, 0] ** 2)) - counted(flight, len(residual))
+               for residual, _ in path_residuals(of_paths(flight, (component,)), parameters))
+
+
+def counted(flight: Reconstruction, samples: int) -> int:
+    """Samples of a path that count as if they were CORRELATED apart."""
+    return round(samples * min(flight.dt / CORRELATED, 1.0))
 
 
 def in_step(flights: Sequence[Reconstruction]) -> list[Reconstruction]:

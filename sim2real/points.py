@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,12 +12,12 @@ from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.attribution import reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, parameter_rows
-from sim2real.evidence import Evidence, compare, predicted
-from sim2real.predictor import innovations
+from sim2real.courses import Courses, Remainder
+from sim2real.evidence import SETTLE, Evidence, compare
+from sim2real.paths import PATHS, excess, of_paths, path_gram
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.sets import SetFit
-from sim2real.terms import pushes
 
 ROUNDS = 4
 SETTLED = 0.2  # gain of half the whitened square that is worth another round
@@ -49,6 +49,7 @@ class Flying:
     evidences: Sequence[Evidence]
     baseline: Baseline
     tempering: float
+    courses: Courses
 
     def settle(self, fit: SetFit, start: FloatArray) -> Point:
         """Gauss-Newton on sizes and nuisances, from nuisances `start` [n]; a step that does not help is halved.
@@ -89,40 +90,51 @@ class Flying:
         cost = 0.5 * (gram[0, 0] + nuisances @ prior @ nuisances)
         return Point(sizes, nuisances, float(cost), slope, information)
 
-    def left_over(self, fit: SetFit, point: Point) -> FloatArray:
-        """Inner products of what a set leaves where it was flown (row 0) and generic terms, all else integrated out."""
+    def left_over(self, fit: SetFit, point: Point) -> Remainder:
+        """What a set leaves where it was flown, everything in it free to give way.
+
+        What generic terms would make of the records is taken from flights about the model.
+        """
         terms, k, n = self.candidates.terms, len(point.sizes), len(point.nuisances)
-        first, count = 1 + k + n, len(terms)
-        steps = _steps(fit, point.sizes)
+        first, steps = 1 + k + n, _steps(fit, point.sizes)
         moved = tuple(replace(term, row=first + j) for j, term in enumerate(terms))
-        gram = np.zeros((first + count, first + count))
-        for flight, evidence in zip(self.flights, self.evidences, strict=True):
+        gram, kept, left_in = np.zeros((first + len(terms),) * 2), [], dict.fromkeys(PATHS, 0.0)
+        for flight, evidence, generic in zip(self.flights, self.evidences, self.courses.of_terms(terms), strict=True):
             rows = _rows(flight, self.candidates, fit, point.sizes, steps, point.nuisances)
-            base = innovations(replace(flight, parameters=rows[:1]), rows[:1], evidence.gain.K)[:, 0]
-            pushed = pushes(replace(flight, measured=predicted(flight, base)), moved)
-            rows = np.concatenate([rows, np.repeat(rows[:1], count)])
-            gram += compare(flight, rows, pushed, evidence.gain, evidence.factor, moved).gram / self.tempering
+            for component in PATHS:
+                left_in[component] += excess(flight, rows[:1], component) / self.tempering
+            own = compare(flight, rows, (), evidence.gain, evidence.factor, keep=range(first)).rows
+            both = np.concatenate([own, generic], axis=1)
+            rows = np.concatenate([rows, np.repeat(rows[:1], len(terms))])
+            gram += (both.T @ both + path_gram(flight, rows, moved, round(SETTLE / flight.dt))) / self.tempering
+            kept.append(own)
         precision = self.baseline.precision
         gram[first - n : first, first - n : first] += precision
         gram[first - n : first, 0] += precision @ point.nuisances
         gram[0, first - n : first] = gram[first - n : first, 0]
         gram[0, 0] += point.nuisances @ precision @ point.nuisances
-        gone = np.arange(1, first)
-        inner = gram[np.ix_(gone, gone)] + 1e-2 * np.diag(np.arange(first - 1) < k)
-        reduced = gram - gram[:, gone] @ np.linalg.solve(inner, gram[gone])
-        kept = np.concatenate([[0], np.arange(first, first + count)])
-        return np.asarray(reduced[np.ix_(kept, kept)])
+        gram[1 : 1 + k, 1 : 1 + k] += 1e-2 * np.eye(k)
+        return Remainder(gram, first, kept, left_in)
 
-    def beside(self, fit: SetFit, point: Point) -> FloatArray:
-        """Inner products of every effect of the library (rows of the bank) about a set where it was flown."""
+    def beside(self, fit: SetFit, point: Point, home: Collection[str]) -> list[FloatArray]:
+        """Inner products of every effect of the library (rows of the bank) about a set where it was flown.
+
+        Then the same without what free courses of time at `home`, or a path there, would explain.
+        """
         only = replace(self.candidates, terms=())
         total = np.zeros((self.candidates.size, self.candidates.size))
-        for flight, evidence in zip(self.flights, self.evidences, strict=True):
+        taken, freed = total.copy(), self.courses.at(home)
+        for i, (flight, evidence) in enumerate(zip(self.flights, self.evidences, strict=True)):
             at = _rows(flight, self.candidates, fit, point.sizes, np.zeros(len(point.sizes)), point.nuisances)[:1]
             rows = parameter_rows(replace(flight, parameters=at), only)
-            total += compare(flight, rows, (), evidence.gain, evidence.factor).gram / self.tempering
-        gram = with_prior(total, self.candidates, self.baseline.precision, point.nuisances)
-        return reduce(gram, self.candidates, np.zeros_like(self.baseline.precision))
+            found = compare(flight, rows, (), evidence.gain, evidence.factor, keep=range(len(rows)))
+            total += found.gram / self.tempering
+            taken += path_gram(of_paths(flight, home), rows, (), round(SETTLE / flight.dt)) / self.tempering
+            if freed:
+                taken += freed[i].taken(found.rows, self.tempering)
+        prior, nothing = self.baseline.precision, np.zeros_like(self.baseline.precision)
+        return [reduce(with_prior(gram, self.candidates, prior, point.nuisances), self.candidates, nothing)
+                for gram in (total, total - taken)]
 
 
 def _steps(fit: SetFit, sizes: FloatArray) -> FloatArray:

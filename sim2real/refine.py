@@ -15,17 +15,31 @@ import numpy as np
 from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
-from sim2real.form import Form, at_home, gain, own_terms, room, shares, split, with_terms
+from sim2real.courses import Remainder
+from sim2real.form import OTHER_FORM, SHARES, Form, gain, given, home, own_terms, room, split, with_terms
 from sim2real.generic import UnknownFit, fit_unknown
-from sim2real.hypotheses import Hypothesis, Posterior, forgive, normalised, pair_prior
+from sim2real.hypotheses import (
+    P_BESIDE,
+    P_NONE,
+    P_UNKNOWN,
+    Hypothesis,
+    Posterior,
+    forgive,
+    is_home,
+    normalised,
+    pair_prior,
+)
+from sim2real.inherit import inherited
 from sim2real.points import Flying, Point
 from sim2real.sets import Modes, SetFit, integrate
 from sim2real.singles import EffectFit, fit_family
 from sim2real.sizes import in_powers
+from sim2real.terms import Term
 
 LEADING, LIKELY = 2, 0.02  # explanations that are flown again, and how probable they have to be
 CERTAIN = 0.05  # probability of no gap above which nothing is: sizes near zero have no likelihood of Gaussian shape
-MOST = 8  # explanations flown again; what looks better then and has not been flown is not believed
+MOST = 7  # explanations flown again; what looks better then and has not been flown is not believed
+FEW_PLACES = 5  # components at which courses of time are freed together
 COMPANIONS, WORTH = 2, 5.0  # effects flown beside the best single one, and the log evidence that they have to add
 
 
@@ -33,7 +47,7 @@ def leading(posterior: Posterior) -> list[Hypothesis]:
     """Explanations to fly again where there is a gap at all: the probable ones, and the best single effect."""
     if posterior.none > CERTAIN:
         return []
-    known = [h for h in posterior.hypotheses if h.unknown is None]
+    known = sorted((h for h in posterior.hypotheses if h.unknown is None), key=lambda h: -h.log_posterior)
     chosen = [h for h in known if h.probability > LIKELY][:LEADING]
     chosen += [h for h in known if len(h.effects) == 1 and h not in chosen][:1]
     return chosen if any(h.effects for h in chosen) else []
@@ -48,10 +62,10 @@ def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior:
         posterior: of the linear fit.
     """
     search = _Search(flying, start, posterior)
-    search.fly([search.found.index(h) for h in leading(posterior)])
+    search.fly([search.nothing_at_all(), *(search.found.index(h) for h in leading(posterior))])
     search.fly(search.companions())
     while len(search.points) < MOST and (best := search.best()) not in search.points:
-        search.fly([best])
+        search.fly([search.first_of(best)])
     return search.posterior()
 
 
@@ -63,6 +77,7 @@ class _Search:
         self.found = list(posterior.hypotheses)
         self.before = list(self.found)  # as the linear fit has them
         self.points: dict[int, Point] = {}
+        self.left: dict[int, Remainder] = {}
         self.generic: dict[int, list[UnknownFit]] = {}
         self.added: set[int] = set()  # proposed beside a flown one: no linear fit to correct others by
         self.nothing, self.noise = float(posterior.reduced[0, 0]), np.inf
@@ -74,35 +89,64 @@ class _Search:
         for i in waiting:
             if i not in self.points:
                 self._fly(i)
-        found = _inherited(self.found, self.before, [j for j in self.points if j not in self.added], self.points)
-        self.found = forgive(found, self.nothing, self._least())
+        found = inherited(self.found, self.before, [j for j in self.points if j not in self.added], self.points)
+        self.found = forgive(found, self.nothing, self._least(), self._bare())
 
     def best(self) -> int:
         """The most probable known set, flown or not."""
         known = [i for i, h in enumerate(self.found) if h.unknown is None]
         return max(known, key=lambda i: self.found[i].log_posterior)
 
+    def first_of(self, i: int) -> int:
+        """A single effect of set `i` that was not flown yet, the most probable first; else the set.
+
+        What flying a single effect corrects, all sets that hold it inherit.
+        """
+        alone = [j for j, h in enumerate(self.found) if j not in self.points and h.unknown is None
+                 and len(h.effects) == 1 and set(h.effects) < set(self.found[i].effects)]  # fmt: skip
+        return max(alone, key=lambda j: self.found[j].log_posterior, default=i)
+
     def _fly(self, i: int) -> None:
         h = self.found[i]
         self.points[i] = self.flying.settle(h.fit, self.start(h))
         h = _corrected(h, self.points[i], self.linear)
-        left = self.flying.left_over(h.fit, self.points[i])
+        self.left[i] = self.flying.left_over(h.fit, self.points[i])
+        left = self.left[i].reduced()
         bank = self.flying.candidates
         moved = tuple(replace(term, row=1 + j) for j, term in enumerate(bank.terms))
-        self.generic[i] = fit_unknown(left, replace(bank, terms=moved))
+        self.generic[i] = self._fit_unknown(left)
         if h.effects:
-            own = own_terms(h.effects, moved)
-            rows = [term.row for term in own]
-            form = gain(left[np.ix_(rows, rows)], left[rows, 0], room(h.fit, self.linear.reduced, own), h.fit.misfit,
-                        shares(len(h.effects)))
-            elsewhere = [u for u in self.generic[i] if u.log_evidence > 0.0 and not at_home(u.component, h.effects)]
-            most = max((float(left[0, 0]) - u.misfit for u in elsewhere), default=0.0)
-            h = replace(h, form=replace(form, foreign=most))
+            rows, square = self._room(h, moved)
+            form = gain(left[np.ix_(rows, rows)], left[rows, 0], square, h.fit.misfit)
+            h = replace(h, form=replace(form, free=self._free(i, h.effects)), instead=None)
+        else:
+            self.nothing = h.fit.misfit
         self.found[i] = h
+
+    def _room(self, h: Hypothesis, terms: Sequence[Term]) -> tuple[list[int], FloatArray]:
+        """Rows of the generic terms at home of a set, and what `room` there is for each."""
+        own = own_terms(h.effects, terms)
+        return [term.row for term in own], room(h.fit, self.linear.reduced, own, self.nothing)
+
+    def _free(self, i: int, effects: Sequence[str], *more: str) -> tuple[tuple[float, int], ...]:
+        """What free courses of time would take: at home of each effect, or at `more`; then at all of these."""
+        each = [home((name,)) for name in effects] + [{component} for component in more]
+        together = set().union(*each)
+        places = [*each, together] if len(each) > 1 and len(together) <= FEW_PLACES else each
+        return tuple((self.flying.courses.free(self.left[i], at), len(at)) for at in places)
+
+    def nothing_at_all(self) -> int:
+        """Index of no gap."""
+        return next(i for i, h in enumerate(self.found) if not h.effects and h.unknown is None)
 
     def _least(self) -> float:
         """What noise alone would leave, as far as what was flown shows."""
         return min([self.noise, *(self.found[i].left for i in self.points)])
+
+    def _bare(self) -> float:
+        """The same where the best of them may do whatever it likes at home."""
+        flown = [self.found[i] for i in self.points]
+        return min(h.fit.misfit if h.form is None else h.form.bare() for h in flown)
 
     def _ranked(self, effects: int | None = None) -> list[int]:
         """Flown hypotheses, the best first; those of so many effects alone if given."""
@@ -110,20 +154,24 @@ class _Search:
         return sorted(chosen, key=lambda i: -self.found[i].log_posterior)
 
     def companions(self) -> list[int]:
-        """Pairs of the best single effect, where it was flown, with whatever explains most of what it leaves."""
+        """Pairs of the best single effect, where it was flown, with whatever explains most of what it leaves.
+
+        And of what no free course of time would explain where that effect enters: its own form would hide a second one.
+        """
         if not (alone := self._ranked(1)):
             return []
-        first = self.found[alone[0]]
-        reduced = self.flying.beside(first.fit, self.points[alone[0]])
-        best: dict[str, EffectFit] = {}
-        for family in self.flying.candidates.families:
-            name = family.effect.name
-            if name in self.linear.fits and name not in first.effects:
-                fit = fit_family(reduced, family)
-                if name not in best or fit.log_evidence > best[name].log_evidence:
-                    best[name] = fit
-        promising = sorted(best.values(), key=lambda fit: -fit.log_evidence)[:COMPANIONS]
-        return [self._propose(first, fit) for fit in promising if fit.log_evidence > WORTH]
+        first, out = self.found[alone[0]], dict[str, EffectFit]()
+        for reduced in self.flying.beside(first.fit, self.points[alone[0]], home(first.effects)):
+            best: dict[str, EffectFit] = {}
+            for family in self.flying.candidates.families:
+                name = family.effect.name
+                if name in self.linear.fits and name not in first.effects:
+                    fit = fit_family(reduced, family)
+                    if name not in best or fit.log_evidence > best[name].log_evidence:
+                        best[name] = fit
+            promising = sorted(best.values(), key=lambda fit: -fit.log_evidence)[:COMPANIONS]
+            out |= {fit.family.effect.name: fit for fit in promising if fit.log_evidence > WORTH}
+        return [self._propose(first, fit) for fit in out.values()]
 
     def _propose(self, first: Hypothesis, second: EffectFit) -> int:
         """Index of the pair, with sizes as found beside the first."""
@@ -146,70 +194,59 @@ class _Search:
         self.added.add(len(self.found) - 1)
         return len(self.found) - 1
 
+    def _beside(self, i: int) -> tuple[UnknownFit | None, list[Hypothesis]]:
+        """Terms of a flown set's form, and something unknown beside it (alone if it is empty), its own form allowed."""
+        known, bank = self.found[i], self.flying.candidates
+        moved = tuple(replace(term, row=1 + j) for j, term in enumerate(bank.terms))
+        left, gained, own = self.left[i].reduced(), 0.0, None
+        fits = self.generic[i] if known.effects else [u for u in self.generic[i] if not self._named(u)]
+        if known.effects and known.form is not None:
+            own, fits = split(known.fit, fits, self.nothing, self.linear.raw)
+            ways = [known.form.way(k, self.nothing, self._least(), self._bare()) for k in range(len(known.form.gained))]
+            if 0 < (k := int(np.argmax(ways))) <= len(SHARES):
+                gained = known.form.gained[k] + float(np.log(OTHER_FORM))
+                left = given(left, *self._room(known, moved), SHARES[k - 1])
+                fits = split(known.fit, self._fit_unknown(left), self.nothing, self.linear.raw)[1]
+        if not fits:
+            return own, []
+        best = max(fits, key=lambda u: u.log_evidence)
+        more = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
+        taken = known.fit.misfit - best.misfit
+        free = tuple((max(f - taken, 0.0), n) for f, n in self._free(i, known.effects, best.component))
+        prior = np.log(P_BESIDE / (1.0 - P_NONE)) + known.log_prior if known.effects else np.log(P_UNKNOWN)
+        return own, [Hypothesis(known.fit, best, float(prior),
+                                known.log_evidence + gained + more,
+                                Form((0.0,), (best.misfit,), free))]
+
+    def _fit_unknown(self, left: FloatArray) -> list[UnknownFit]:
+        """Generic terms on what a flown set leaves; their weights in rows of the bank."""
+        bank = self.flying.candidates
+        moved = tuple(replace(term, row=1 + j) for j, term in enumerate(bank.terms))
+        return [replace(u, weights={bank.terms[row - 1].row: w for row, w in u.weights.items()})
+                for u in fit_unknown(left, replace(bank, terms=moved))]
+
+    def _named(self, unknown: UnknownFit) -> bool:
+        """Whether generic terms alone are another form of a single effect of the library."""
+        return any(is_home(h, unknown, self.nothing, self.linear.raw) for h in self.found)
+
     def posterior(self) -> Posterior:
         """All hypotheses with their probabilities.
 
-        Something unknown beside a set is believed only where the set has been flown: beside the best one, and beside
-        the best of single effects.
+        Something unknown is believed only beside what has been flown: nothing, the best set, the best single effect.
         """
         ranked, others = self._ranked(), list[Hypothesis]()
         found = list(self.found)
-        for i in dict.fromkeys([ranked[0], *self._ranked(1)[:1]]):
-            known, fits = found[i], self.generic[i]
-            if known.effects:
-                home, fits = split(known.fit, self.linear.reduced, fits)
-                found[i] = replace(known, form=with_terms(known.form, home))
-            others += [_beside(h, known, fits, self.flying) for h in found
-                       if h.unknown is not None and h.effects == known.effects and fits]
+        for i in dict.fromkeys([self.nothing_at_all(), ranked[0], *self._ranked(1)[:1]]):
+            own, beside = self._beside(i)
+            found[i] = replace(found[i], form=with_terms(found[i].form, own))
+            others += beside
         bound = found[ranked[0]].log_posterior
-        kept = [h for i, h in enumerate(found) if i in self.points or (h.unknown is None and h.log_posterior < bound)
-                or (h.unknown is not None and not h.effects and found[ranked[0]].effects)] + others  # fmt: skip
+        kept = [h for i, h in enumerate(found)
+                if i in self.points or (h.unknown is None and h.log_posterior < bound)] + others
         least = min([self._least(), *(h.left for h in others)])
-        return replace(self.linear, hypotheses=normalised(forgive(kept, self.nothing, least), 0.0))
-
-
-def _beside(h: Hypothesis, known: Hypothesis, fits: Sequence[UnknownFit], flying: Flying) -> Hypothesis:
-    """Something unknown beside a set (or alone), as what the set leaves where it was flown has it."""
-    best = max(fits, key=lambda u: u.log_evidence)
-    more = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
-    weights = {t.row: best.weights[1 + j] for j, t in enumerate(flying.candidates.terms) if 1 + j in best.weights}
-    return replace(h, fit=known.fit, unknown=replace(best, weights=weights), log_evidence=known.log_evidence + more)
-
-
-def _inherited(found: Sequence[Hypothesis], before: Sequence[Hypothesis], bases: Iterable[int],
-               points: Iterable[int]) -> list[Hypothesis]:
-    """Sets that were not flown, corrected by as much as the largest set within them was that was.
-
-    What polynomials in its size miss of an effect they miss in every set that holds it; else the sets that nobody has
-    flown yet would always look best.
-    """
-    flown, out = [j for j in bases if found[j].effects], list(found)
-    for i, h in enumerate(before):
-        within = [j for j in flown if set(before[j].effects) <= set(h.effects)]
-        if i in points or not within:
-            continue
-        nearest = max(within, key=lambda j: len(before[j].effects))
-        now, then = found[nearest], before[nearest]
-        more = now.fit.misfit - then.fit.misfit
-        form, unknown = h.form, h.unknown
-        if form is not None:
-            form = _moved(form, now, then, h.fit.misfit + more)
-        if unknown is not None:
-            unknown = replace(unknown, misfit=unknown.misfit + more)
-        out[i] = replace(h, fit=replace(h.fit, misfit=h.fit.misfit + more), form=form, unknown=unknown,
-                         log_evidence=h.log_evidence + now.log_evidence - then.log_evidence)
-    return out
-
-
-def _moved(form: Form, now: Hypothesis, then: Hypothesis, misfit: float) -> Form:
-    """A form corrected by as much as that of a set within was; `misfit` is what the larger set leaves now."""
-    more, one, other = now.fit.misfit - then.fit.misfit, now.form, then.form
-    if one is None or other is None or not len(form.gained) == len(one.gained) == len(other.gained):
-        return Form(form.gained, tuple(left + more for left in form.left))
-    ways = range(len(form.gained))
-    return Form(tuple(form.gained[k] + one.gained[k] - other.gained[k] for k in ways),
-                tuple(form.left[k] + one.left[k] - other.left[k] for k in ways),
-                max(one.foreign - max(now.fit.misfit - misfit, 0.0), 0.0))
+        bare = self._bare()
+        return replace(self.linear, hypotheses=normalised(forgive(kept, self.nothing, least, bare), 0.0), bare=bare,
+                       settled=self.points[ranked[0]].nuisances)
 
 
 def _corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior) -> Hypothesis:

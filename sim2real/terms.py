@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy.signal import lfilter
@@ -43,12 +44,14 @@ GENERIC: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 BEYOND: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("x_force", "u", ("beta*beta", "rudder*rudder")),
     ("z_force", "w", ("beta*beta", "alpha*alpha*alpha")),
-    ("pitching_moment", "q", ("beta*beta", "alpha*alpha*alpha", "aileron", "p", "r", "power")),
-    ("y_force", "v", ("aileron", "alpha*p", "alpha*rudder")),
-    ("rolling_moment", "p", ("alpha", "q", "alpha*p", "aileron*aileron*aileron", "power")),
-    ("yawing_moment", "r", ("alpha", "q", "alpha*p", "alpha*aileron", "alpha*rudder", "power")),
-    ("sensor:airspeed", "airspeed", ("alpha", "beta")),
-    ("sensor:alpha", "alpha", ("airspeed", "q")), ("sensor:beta", "beta", ("alpha", "p", "r")),
+    ("pitching_moment", "q", ("beta*beta", "alpha*alpha*alpha", "elevator*elevator*elevator", "aileron", "p", "r",
+                              "power")),
+    ("y_force", "v", ("aileron", "alpha*p", "alpha*rudder", "beta*beta*beta")),
+    ("rolling_moment", "p", ("alpha", "q", "alpha*p", "aileron*aileron*aileron", "beta*beta*beta", "power")),
+    ("yawing_moment", "r", ("alpha", "q", "alpha*p", "alpha*aileron", "alpha*rudder", "beta*beta*beta",
+                            "rudder*rudder*rudder", "power")),
+    ("sensor:airspeed", "airspeed", ("alpha", "beta", "airspeed*airspeed")),
+    ("sensor:alpha", "alpha", ("airspeed", "q", "alpha*alpha")), ("sensor:beta", "beta", ("alpha", "p", "r")),
     ("sensor:p", "p", ("q", "r", "az")), ("sensor:q", "q", ("p", "r", "az")), ("sensor:r", "r", ("p", "q", "az")),
     ("sensor:phi", "phi", ("slow_phi", "slow_ay")), ("sensor:theta", "theta", ("slow_theta", "slow_ax")),
     ("sensor:ax", "ax", ("q_dot", "alpha")), ("sensor:ay", "ay", ("p_dot", "r_dot")),
@@ -63,12 +66,13 @@ BEYOND: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 GENERIC_SIZE = {"u": 0.008, "w": 0.03, "v": 0.01, "p": 0.002, "q": 0.015, "r": 0.002}
 PATH_SIZE = {"1": 0.5 * math.pi / 180.0, "position": 0.1, "acceleration": 0.0025, "inertia": 0.005,
              "position*position*position": 0.1, "direction": 0.25 * math.pi / 180.0}  # rad, 1, s2, s2, 1, rad (assumed)
-THRUST_SIZE = {"both": 0.1, "both*airspeed": 0.1, "left": 0.1, "left*airspeed": 0.1}  # (assumed)
+THRUST_SIZE = 0.1  # (assumed)
 DEVIATION = {"alpha": 0.05, "beta": 0.05, "q": 0.1, "p": 0.2, "r": 0.1, "elevator": 0.04, "aileron": 0.08,
              "rudder": 0.05, "airspeed": 5.0, "power": 0.2, "phi": 0.2, "theta": 0.1, "ax": 1.0, "ay": 1.0, "az": 2.0,
              "p_dot": 1.0, "q_dot": 0.5, "r_dot": 0.3}  # fmt: skip  # what counts as one unit of a regressor (assumed)
 SECOND_ORDER = 0.1  # s, by which an actuator of second order smooths what it lacks in acceleration (assumed)
 ERECTION = 30.0  # s in which a vertical gyro follows a false vertical (assumed)
+KNOT, KNOT_AT = 1.0, "at:"  # s between the knots of a free course of time (assumed: manoeuvres are slower)
 
 
 def pushes(flight: Reconstruction, terms: Sequence[Term]) -> tuple[Push, ...]:
@@ -86,17 +90,29 @@ def pushes(flight: Reconstruction, terms: Sequence[Term]) -> tuple[Push, ...]:
     return tuple(out)
 
 
+def at_any_time(flight: Reconstruction, component: str, first: int) -> list[Term]:
+    """Terms that together are a free course of time at a force, a moment, a sensor or the engines, for one record.
+
+    Args:
+        first: row of the first.
+    """
+    times = np.arange(0.0, flight.time[-1] - flight.time[0] + KNOT, KNOT)
+    target = next(target for where, target, _ in (*GENERIC, *BEYOND) if where == component)
+    kinds = ("both*", "left*") if component == "propulsion" else ("",)
+    return [Term(component, f"{kind}{KNOT_AT}{t:g}", target, first + i)
+            for i, (kind, t) in enumerate(product(kinds, times))]
+
+
 def _thrust_pushes(flight: Reconstruction, term: Term) -> list[Push]:
     """A share of both engines' thrust or of the left one's: felt, and read where recorded."""
-    p, sides = flight.parameters[0], ("left", "right") if term.name.startswith("both") else ("left",)
+    side, _, course = term.name.partition("*")
+    p, sides = flight.parameters[0], ("left", "right") if side == "both" else ("left",)
     speed = flight.channel("airspeed")
     per_power = p["propeller_efficiency"] / np.sqrt(speed**2 + p["propeller_static_speed"] ** 2)
     out = []
     for side in sides:
         thrust = flight.controls[f"power_{side}"] * per_power
-        series = THRUST_SIZE[term.name] * thrust
-        if term.name.endswith("*airspeed"):
-            series = series * (speed - np.median(speed)) / DEVIATION["airspeed"]
+        series = THRUST_SIZE * thrust * _course(flight, course or "1")
         yaw = p["engine_arm_y"] / p["inertia_zz"] * (1.0 if side == "left" else -1.0)
         out += [Push(term.row, "u", series / p["mass"], False), Push(term.row, "r", yaw * series, False),
                 Push(term.row, "q", p["engine_arm_z"] / p["inertia_yy"] * series, False),
@@ -116,12 +132,15 @@ def path_course(flight: Reconstruction, position: FloatArray, name: str) -> Floa
 
 
 def _course(flight: Reconstruction, name: str) -> FloatArray:
-    """Product of the deviations named, in units of DEVIATION; a ramp from -1 to 1 for time."""
+    """Product of the deviations named, in units of DEVIATION; a ramp from -1 to 1 for time, or a hat about a knot."""
     n = len(flight.time)
     if name == "1":
         return np.ones(n)
     if name == "time":
         return np.linspace(-1.0, 1.0, n)
+    if name.startswith(KNOT_AT):
+        passed = flight.time - flight.time[0] - float(name.removeprefix(KNOT_AT))
+        return np.maximum(1.0 - np.abs(passed) / KNOT, 0.0)
     out = np.ones(n)
     for factor in name.split("*"):
         values = _values(flight, factor)
@@ -145,7 +164,7 @@ def _values(flight: Reconstruction, factor: str) -> FloatArray:
 def _sensor_course(flight: Reconstruction, name: str, channel: str) -> FloatArray:
     """Bias of one tolerance, scale error of 10 %, a lag of 0.1 s, or a drift over the record."""
     tolerance = TOLERANCE[channel]
-    if name in ("1", "time"):
+    if name in ("1", "time") or name.startswith(KNOT_AT):
         return tolerance * _course(flight, name)
     if name.startswith("slow_"):
         course, share = _course(flight, name.removeprefix("slow_")), flight.dt / ERECTION
@@ -166,14 +185,15 @@ def unit_of(term: str, component: str) -> float:
     if component.endswith("_path"):
         return PATH_SIZE[term] if term in PATH_SIZE else PATH_SIZE["1"] / DEVIATION[term]
     if component == "propulsion":
-        return THRUST_SIZE[term] / (DEVIATION["airspeed"] if term.endswith("*airspeed") else 1.0)
+        return THRUST_SIZE / (DEVIATION["airspeed"] if term.endswith("*airspeed") else 1.0)
     target = next(target for where, target, _ in GENERIC if where == component)
     if component.startswith("sensor:"):
         if term not in ("1", "time") and term.removesuffix("_dot") == target:
             return 0.1
-        return TOLERANCE[target] / DEVIATION.get(term.removeprefix("slow_"), 1.0)
-    size = GENERIC_SIZE[target]
-    for factor in term.split("*"):
+        size = TOLERANCE[target]
+    else:
+        size = GENERIC_SIZE[target]
+    for factor in term.removeprefix("slow_").split("*"):
         size /= DEVIATION.get(factor, 1.0)
     return size
 

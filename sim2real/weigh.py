@@ -7,19 +7,25 @@ from dataclasses import replace
 
 import numpy as np
 
+from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.attribution import attribute, nuisance_mean, reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, shifted
-from sim2real.evidence import SIGMAS, Evidence, choose_gain, gather
+from sim2real.courses import Courses
+from sim2real.evidence import SIGMAS, Evidence, choose_gain, gather, predicted
 from sim2real.hypotheses import Hypothesis, Posterior, leaving_out, normalised
-from sim2real.kalman import Gain, gains
+from sim2real.kalman import Gain, follow, gains
 from sim2real.points import Flying
+from sim2real.predictor import innovations
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.refine import leading, refine
+from sim2real.terms import pushes
 
 SETTLING, SETTLED = 4, 3.0  # steps towards the best nuisances, and the whitened length of a step that ends them
 RELINEARISE = 8.0  # whitened distance of the fitted nuisances beyond which all is flown again about them
+CALMER = 0.6  # ratio of temperings below which the leading explanations are flown again
+UNLIKE = 0.14  # log of the ratio of innovation variances beyond which another gain is worth a flight
 FIRST_ORDER = 3.0  # least tempering where another simulator's accelerations stand in for its flight (assumed)
 FARTHEST = 4.0  # standard deviations: what is beyond is no nuisance
 Progress = Callable[[str], None]
@@ -54,8 +60,46 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
         def start(known: Hypothesis) -> FloatArray:
             return centre + nuisance_mean(gram, candidates, known.weights)
 
-        posterior = refine(Flying(flights, candidates, evidences, baseline, posterior.tempering), start, posterior)
+        def flying(tempering: float) -> Flying:
+            return Flying(flights, candidates, evidences, baseline, tempering, Courses(evidences, tempering))
+
+        posterior = refine(flying(posterior.tempering), start, posterior)
+        chosen = [explained(e, f, candidates, posterior) for e, f in zip(evidences, flights, strict=True)]
+        other = max(unlike(g, e.gain) for g, e in zip(chosen, evidences, strict=True)) > UNLIKE
+        calm = temper(posterior.bare * posterior.tempering, evidences)
+        if other or calm < CALMER * posterior.tempering:
+            progress("flying the leading explanations again, gusts and remainder judged with them")
+            if other:
+                evidences = gather_about(flights, candidates, centre, chosen)
+            posterior = weigh(evidences, candidates, dict(untestable), baseline, centre, calm)
+            gram = with_prior(total(evidences) / calm, candidates, baseline.precision, centre)
+            posterior = refine(flying(calm), start, posterior)
     return evidences, replace(posterior, hypotheses=normalised(posterior.hypotheses))
+
+
+def explained(evidence: Evidence, flight: Reconstruction, candidates: Bank, posterior: Posterior) -> Gain:
+    """The gain of the best explanation, with the gust intensity that is likeliest with it in the model.
+
+    Without it, what a gap makes of a record passes for gust, or for calm; and the innovations of an aircraft whose
+    vanes lag by far more than published are not white in gusts: their colour would be blamed on something.
+    """
+    best = posterior.best
+    row = shifted(flight.parameters, candidates.nuisances, np.asarray(posterior.settled), flight.power_from)
+    if best.effects:
+        row = effects.with_effects(row, {f.effect.name: {f.parameter.name: size}
+                                         for f, size in zip(best.fit.families, best.fit.estimate, strict=True)})
+    moved, weights = replace(flight, parameters=row), best.unknown.weights if best.unknown else {}
+    base = innovations(moved, row, evidence.gain.K)[:, 0]
+    terms = [term for term in candidates.terms if term.row in weights]
+    pushed = [replace(push, series=weights[push.row] * push.series)
+              for push in pushes(replace(moved, measured=predicted(moved, base)), terms)]
+    return follow(moved, choose_gain(moved, gains(moved, SIGMAS), pushed))
+
+
+def unlike(one: Gain, other: Gain) -> float:
+    """Largest log of the ratio of two gains' innovation variances, once steady."""
+    a, b = (np.diagonal(gain.S, axis1=-2, axis2=-1).reshape(-1, gain.S.shape[-1])[-1] for gain in (one, other))
+    return float(np.max(np.abs(np.log(a / b))))
 
 
 def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline) -> tuple[FloatArray, list[Gain]]:
@@ -104,7 +148,7 @@ def total(evidences: Sequence[Evidence]) -> FloatArray:
 
 
 def weigh(evidences: Sequence[Evidence], candidates: Bank, untestable: dict[str, str], baseline: Baseline,
-          centre: FloatArray) -> Posterior:
+          centre: FloatArray, tempering: float | None = None) -> Posterior:
     """Posterior of all records together; effects whose whole range would not show are added to `untestable`.
 
     Args:
@@ -112,6 +156,7 @@ def weigh(evidences: Sequence[Evidence], candidates: Bank, untestable: dict[str,
         untestable: effects left out, with the reason; changed in place.
         baseline: the model and its precision.
         centre: nuisances [n] by which the flown model had been moved.
+        tempering: of the evidence; as what is left says if omitted.
     """
     data, nothing = total(evidences), np.zeros_like(baseline.precision)
 
@@ -120,10 +165,9 @@ def weigh(evidences: Sequence[Evidence], candidates: Bank, untestable: dict[str,
         noise = sum(e.samples for e in evidences) / tempering if tempering > 1.0 else np.inf
         return replace(attribute(gram, candidates, tuple(untestable), nothing, noise), tempering=tempering)
 
-    posterior = posterior_of(1.0)
-    tempering = temper(posterior.least_misfit, evidences)
-    if tempering > 1.0:
-        posterior = posterior_of(tempering)
+    posterior = posterior_of(tempering or 1.0)
+    if tempering is None and (found := temper(posterior.least_misfit, evidences)) > 1.0:
+        posterior = posterior_of(found)
     quiet = [name for name, found in posterior.fits.items() if found.smallest is None]
     for name in quiet:
         untestable[name] = "no excitation: these records would not show it anywhere in its range"

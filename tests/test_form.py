@@ -9,7 +9,20 @@ from hypothesis import strategies as st
 
 from icing_env import effects
 from sim2real.candidates import bank
-from sim2real.form import ALIKE, DIRECTIONS, FORGIVEN, SHARES, Form, forgiven, gain, own_terms, without
+from sim2real.form import (
+    ALIKE,
+    DIRECTIONS,
+    FORGIVEN,
+    LEAK,
+    LUCK,
+    SHARES,
+    Form,
+    forgiven,
+    gain,
+    own_terms,
+    without,
+)
+from sim2real.form import given as after_terms
 from sim2real.generic import fit_unknown
 from sim2real.terms import BEYOND, GENERIC, unit_of
 
@@ -55,8 +68,28 @@ def test_a_small_remainder_is_not_forgiven_and_a_large_one_costs_its_logarithm()
     assert forgiven(2.0, 1e6) < 0.1
     costs = [0.5 * left - forgiven(left, 1e6) for left in (100.0, 1000.0, 10000.0)]
     assert costs == pytest.approx([0.5 * DIRECTIONS * np.log1p(left / DIRECTIONS) for left in (100, 1000, 10000)])
-    assert forgiven(1000.0, 1e6, 1000.0) == forgiven(1000.0, 1e6)  # within the leak
-    assert forgiven(1000.0, 1e4, 1000.0) < 10.0
+    assert forgiven(20.0, 1e6, 20.0) == forgiven(20.0, 1e6)  # within the leak
+    assert forgiven(1000.0, 1e6, 1000.0) < 0.5 * LEAK**2 * 1e6
+    assert forgiven(1000.0, 1e6, 0.0, 4) < forgiven(1000.0, 1e6)  # more places, more ways to explain anything
+
+
+@given(st.floats(0.0, 1e4), st.floats(0.0, 1e4))
+def test_what_no_course_at_home_could_make_is_not_forgiven(left, free):
+    """A second effect elsewhere must not hide in the form of the first."""
+    form, noise, explained = Form((0.0,), (6e4 + left,), ((free, 1),)), 6e4, 1e6
+    got = form.regained(6e4 + left + explained, noise, noise)
+    most = min(left, free + LEAK**2 * explained)
+    assert got <= 0.5 * most + 1e-6
+    assert form.bare() == pytest.approx(6e4 + left - free + LUCK)
+
+
+def test_terms_given_their_room_take_what_the_evidence_says_they_take() -> None:
+    gram = products(1, 20.0)
+    square = np.full(TERMS, 60.0**2 / TERMS)
+    after = after_terms(gram, list(range(1, TERMS + 1)), square, SHARES[1])
+    form = gain(gram[1:, 1:], gram[1:, 0], square, 20.0**2)
+    assert 0.0 < after[0, 0] < 0.2 * gram[0, 0]
+    assert form.left[2] <= after[0, 0] + 1e-6  # the evidence's own square has its prior's share beside it
 
 
 def test_sizes_give_way_before_a_form_is_judged() -> None:
