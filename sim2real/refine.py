@@ -15,6 +15,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
+from sim2real.corrections import corrected, inherited
 from sim2real.courses import Remainder
 from sim2real.form import OTHER_FORM, SHARES, Form, gain, given, home, own_terms, room, split, with_terms
 from sim2real.generic import UnknownFit, fit_unknown
@@ -29,11 +30,9 @@ from sim2real.hypotheses import (
     normalised,
     pair_prior,
 )
-from sim2real.inherit import inherited
 from sim2real.points import Flying, Point
-from sim2real.sets import Modes, SetFit, integrate
+from sim2real.sets import SetFit
 from sim2real.singles import EffectFit, fit_family
-from sim2real.sizes import in_powers
 from sim2real.terms import Term
 
 LEADING, LIKELY = 2, 0.02  # explanations that are flown again, and how probable they have to be
@@ -109,7 +108,7 @@ class _Search:
     def _fly(self, i: int) -> None:
         h = self.found[i]
         self.points[i] = self.flying.settle(h.fit, self.start(h))
-        h = _corrected(h, self.points[i], self.linear)
+        h = corrected(h, self.points[i], self.linear)
         self.left[i] = self.flying.left_over(h.fit, self.points[i])
         left = self.left[i].reduced()
         bank = self.flying.candidates
@@ -247,38 +246,3 @@ class _Search:
         bare = self._bare()
         return replace(self.linear, hypotheses=normalised(forgive(kept, self.nothing, least, bare), 0.0), bare=bare,
                        settled=self.points[ranked[0]].nuisances)
-
-
-def _corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior) -> Hypothesis:
-    """Evidence and sizes of a set from where it settled: its likelihood is taken as Gaussian there."""
-    none = 0.5 * float(posterior.reduced[0, 0])
-    last: FloatArray = np.asarray(np.linalg.solve(point.information, point.slope), np.float64)
-    cost = point.cost - 0.5 * float(point.slope @ last)
-    k = len(point.sizes)
-    if k == 0:
-        return replace(hypothesis, log_evidence=none - cost, fit=replace(hypothesis.fit, misfit=2.0 * cost))
-    inner, across = point.information[:k, :k], point.information[:k, k:]
-    alone = np.asarray(inner - across @ np.linalg.solve(point.information[k:, k:], across.T), np.float64)
-    fit = _integrated(hypothesis.fit, point.sizes, last[:k], cost, alone)
-    log = fit.log_evidence + none
-    return replace(hypothesis, log_evidence=log, fit=replace(fit, log_evidence=log))
-
-
-def _integrated(fit: SetFit, sizes: FloatArray, last: FloatArray, cost: float, information: FloatArray) -> SetFit:
-    """Prior times a Gaussian likelihood of the sizes; log_evidence is the log of its integral.
-
-    Args:
-        sizes, last: where the set was flown, and the step (in ranges of the parameters) that is left.
-        cost, information: half the whitened square there, and its second derivative per square of range.
-    """
-    families, k = fit.families, len(sizes)
-    size = 1 + max(max(f.rows) for f in families)
-    base = in_powers(np.zeros((size, size)), families)
-    span = np.array([f.parameter.high - f.parameter.low for f in families])
-    x = np.clip((sizes - last * span - base.neutral) / base.reach, base.low, base.high)
-    H = information * np.outer(base.reach / span, base.reach / span)
-    gram = np.zeros((1 + k, 1 + k))
-    gram[0, 0], gram[0, 1:], gram[1:, 0], gram[1:, 1:] = 2.0 * cost + x @ H @ x, -H @ x, -H @ x, H
-    modes = Modes(np.arange(k)[None], x[None], np.array([cost]), H[None], np.zeros(1))
-    found = integrate(replace(base, gram=gram, degree=1), modes, 0)
-    return replace(found, log_evidence=found.log_evidence - 0.5 * float(gram[0, 0]))

@@ -1,0 +1,86 @@
+"""What flying a set where it lies changes: its own evidence and sizes, and those of the larger sets that hold it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from icing_env.record import FloatArray
+from sim2real.form import Form
+from sim2real.hypotheses import Hypothesis, Posterior
+from sim2real.points import Point
+from sim2real.sets import Modes, SetFit, integrate
+from sim2real.sizes import in_powers
+
+
+def inherited(found: Sequence[Hypothesis], before: Sequence[Hypothesis], bases: Iterable[int],
+               points: Iterable[int]) -> list[Hypothesis]:
+    """Sets that were not flown, corrected by as much as the largest set within them was that was.
+
+    What polynomials in its size miss of an effect they miss in every set that holds it; else the sets that nobody has
+    flown yet would always look best.
+    """
+    flown, out = [j for j in bases if found[j].effects], list(found)
+    for i, h in enumerate(before):
+        within = [j for j in flown if set(before[j].effects) <= set(h.effects)]
+        if i in points or not within:
+            continue
+        nearest = max(within, key=lambda j: len(before[j].effects))
+        now, then = found[nearest], before[nearest]
+        more = now.fit.misfit - then.fit.misfit
+        form, unknown = h.form, h.unknown
+        if form is not None:
+            form = _moved(form, now, then)
+        if unknown is not None:
+            unknown = replace(unknown, misfit=unknown.misfit + more)
+        out[i] = replace(h, fit=replace(h.fit, misfit=h.fit.misfit + more), form=form, unknown=unknown,
+                         log_evidence=h.log_evidence + now.log_evidence - then.log_evidence)
+    return out
+
+
+def _moved(form: Form, now: Hypothesis, then: Hypothesis) -> Form:
+    """A form corrected by as much as that of a set within was."""
+    more, one, other = now.fit.misfit - then.fit.misfit, now.form, then.form
+    if one is None or other is None or not len(form.gained) == len(one.gained) == len(other.gained):
+        return Form(form.gained, tuple(left + more for left in form.left),
+                    form.free if one is None else one.free)
+    ways = range(len(form.gained))
+    return Form(tuple(form.gained[k] + one.gained[k] - other.gained[k] for k in ways),
+                tuple(form.left[k] + one.left[k] - other.left[k] for k in ways), one.free)
+
+
+def corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior) -> Hypothesis:
+    """Evidence and sizes of a set from where it settled: its likelihood is taken as Gaussian there."""
+    none = 0.5 * float(posterior.reduced[0, 0])
+    last: FloatArray = np.asarray(np.linalg.solve(point.information, point.slope), np.float64)
+    cost = point.cost - 0.5 * float(point.slope @ last)
+    k = len(point.sizes)
+    if k == 0:
+        return replace(hypothesis, log_evidence=none - cost, fit=replace(hypothesis.fit, misfit=2.0 * cost))
+    inner, across = point.information[:k, :k], point.information[:k, k:]
+    alone = np.asarray(inner - across @ np.linalg.solve(point.information[k:, k:], across.T), np.float64)
+    fit = _integrated(hypothesis.fit, point.sizes, last[:k], cost, alone)
+    log = fit.log_evidence + none
+    return replace(hypothesis, log_evidence=log, fit=replace(fit, log_evidence=log))
+
+
+def _integrated(fit: SetFit, sizes: FloatArray, last: FloatArray, cost: float, information: FloatArray) -> SetFit:
+    """Prior times a Gaussian likelihood of the sizes; log_evidence is the log of its integral.
+
+    Args:
+        sizes, last: where the set was flown, and the step (in ranges of the parameters) that is left.
+        cost, information: half the whitened square there, and its second derivative per square of range.
+    """
+    families, k = fit.families, len(sizes)
+    size = 1 + max(max(f.rows) for f in families)
+    base = in_powers(np.zeros((size, size)), families)
+    span = np.array([f.parameter.high - f.parameter.low for f in families])
+    x = np.clip((sizes - last * span - base.neutral) / base.reach, base.low, base.high)
+    H = information * np.outer(base.reach / span, base.reach / span)
+    gram = np.zeros((1 + k, 1 + k))
+    gram[0, 0], gram[0, 1:], gram[1:, 0], gram[1:, 1:] = 2.0 * cost + x @ H @ x, -H @ x, -H @ x, H
+    modes = Modes(np.arange(k)[None], x[None], np.array([cost]), H[None], np.zeros(1))
+    found = integrate(replace(base, gram=gram, degree=1), modes, 0)
+    return replace(found, log_evidence=found.log_evidence - 0.5 * float(gram[0, 0]))
