@@ -105,3 +105,10 @@ def test_ay_is_blamed_only_where_its_factor_is_near_a_unit(side, unit):
             _check_calm_side("record", side, 1.0)
     else:
         _check_calm_side("record", side, 1.0)
+
+
+def test_a_side_force_of_metres_is_not_called_feet():
+    """A vane in the wrong place, or ice on the fin, made a factor of 0.38 of two sound calm records."""
+    _check_calm_side("record", 0.38, 1.0, 0.17)
+    with pytest.raises(InputError, match="ft/s2"):
+        _check_calm_side("record", 0.31, 1.0, 0.5)

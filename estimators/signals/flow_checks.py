@@ -27,6 +27,7 @@ EXPLAINED, CALM = 0.3, 0.93  # R2 from which the motion makes the flow's change,
 SIDE = 0.35  # of a unit's ratio: beyond it an attitude that errs explains the factor of ay as well
 IN_DEGREES = 0.4  # growth of lift by itself per unit of alpha
 FEET = 0.4  # side force per beta over lift per alpha: 0.07 (light aircraft) to 0.34 (fighters), 0.14 to 0.2 here
+METRES = 0.3  # the same ratio below which ay is not in feet, whatever the flow says: there it would be 0.46 and more
 FEEBLE = 0.25  # rad/s2 per rad of a surface: 4 to 16 on these aircraft
 DEGREES = 180.0 / np.pi
 CONTROLS = {"elevator": ("q", ("alpha", "q")), "aileron": ("p", ("beta", "p", "r", "rudder")),
@@ -130,39 +131,53 @@ def _check_beta(where: str, grid: Grid, v: Mapping[str, FloatArray]) -> set[str]
     if match > 0.7:
         name = "'ay'" if clear or (found is not None and abs(turn - 1.0) < 0.3) else "'ay' (or 'beta')"
         raise InputError(f"{where}: column {name} has its sign reversed: the side force goes with beta, not against it")
+    share = _side_share(grid, force, match)
     if calm and abs(turn - 1.0) < 0.3:
-        _check_calm_side(where, side if clear_side else 1.0, bank if clear_bank else 1.0)
+        _check_calm_side(where, side if clear_side else 1.0, bank if clear_bank else 1.0, share)
         return {"beta", "r", "airspeed", "ay"} if clear_side or abs(side - 1.0) < 0.5 else {"beta", "r"}
-    return _check_ay_unit(where, grid, force, match)
+    return _check_ay_unit(where, share)
 
 
-def _check_calm_side(where: str, side: float, bank: float) -> None:
-    """Units that the factors of ay and of gravity betray in calm air: both of airspeed, one of ay."""
+def _check_calm_side(where: str, side: float, bank: float, share: float | None = None) -> None:
+    """Units that the factors of ay and of gravity betray in calm air: both of airspeed, one of ay.
+
+    A factor near that of feet is not enough where the side force itself is known (`share`) and is that of metres.
+    """
     unit = _speed_unit(bank, True)
     if unit and side > 1.2:
         raise InputError(f"{where}: column 'airspeed' looks like {unit}: bank turns the flow {bank:.2f} times "
                          "too little")  # fmt: skip
     unit = nearest_unit(side, {"g": G0, "ft/s2": 0.3048}, SIDE)
+    if unit == "ft/s2" and share is not None and share < METRES:
+        return
     if unit and 0.7 < bank < 1.4:
         raise InputError(f"{where}: column 'ay' looks like {unit}: beta changes at {side:.2g} of it")
 
 
-def _check_ay_unit(where: str, grid: Grid, force: float, match: float) -> set[str]:
-    """The side force per beta is 5 to 35 % of the lift per alpha on an aircraft with a fin; in g it is a tenth of that.
+def _side_share(grid: Grid, force: float, match: float) -> float | None:
+    """Side force per beta over lift per alpha; None where either does not show.
 
     Args:
-        where: the record.
-        grid: its channels.
+        grid: the record's channels.
         force: ay / V^2 per beta, with its correlation `match`.
         match: as above.
     """
     if match > -0.7 or not all(name in grid.values for name in ("alpha", "az")):
-        return set()
+        return None
     good = grid.good(("alpha", "az", "airspeed"))
     lift, known = line(grid.values["alpha"][good], grid.values["az"][good] / grid.values["airspeed"][good] ** 2)
-    if known > -0.7:
+    return None if known > -0.7 else force / lift
+
+
+def _check_ay_unit(where: str, share: float | None) -> set[str]:
+    """The side force per beta is 5 to 35 % of the lift per alpha on an aircraft with a fin; in g it is a tenth of that.
+
+    Args:
+        where: the record.
+        share: of `_side_share`.
+    """
+    if share is None:
         return set()
-    share = force / lift
     for bound, name in ((0.006, "'beta' looks like degrees"), (0.03, "'ay' looks like g")):
         if share < bound:
             raise InputError(f"{where}: column {name}: side force is {share:.3f} of the lift's change with its angle")
