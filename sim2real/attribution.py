@@ -17,7 +17,7 @@ from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
 from sim2real.candidates import NUISANCE_STEP, Bank
-from sim2real.form import Form, gain, home, own_terms, room, split, with_terms, without
+from sim2real.form import Form, gain, home, own_terms, room, shares, split, with_terms, without
 from sim2real.generic import UnknownFit, beside, fit_unknown
 from sim2real.hypotheses import (
     P_BESIDE,
@@ -173,7 +173,8 @@ def _form(reduced: FloatArray, bank: Bank, fit: SetFit) -> Form:
         chosen[1 + m, list(slope)] = list(slope.values())
     chosen[range(first, len(chosen)), [term.row for term in terms]] = 1.0
     square = room(fit, reduced, terms, float(reduced[0, 0]))
-    return gain(*without(chosen @ reduced @ chosen.T, first), square, fit.misfit, len(home(fit.effects)))
+    return gain(*without(chosen @ reduced @ chosen.T, first), square, fit.misfit,
+                shares(len(fit.families)), len(home(fit.effects)))
 
 
 def _with_unknown(reduced: FloatArray, raw: FloatArray, bank: Bank, known: Hypothesis,

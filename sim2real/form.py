@@ -24,14 +24,14 @@ from sim2real.sets import SetFit
 from sim2real.terms import Term
 
 OTHER_FORM = 0.5  # prior probability that an effect has not the library's form (assumed)
-# rho: what terms at home may take, over what the set explains; equally likely (assumed)
-SHARES = (0.15, 0.4, 1.0)
+# rho: what terms at home may take, over what the set explains; equally likely, the last for single effects (assumed)
+SHARES = (0.15, 0.4, 0.8)
 # Of its signature, that a set may leave over for no reason that anybody could name; and where a component that it does
 # not enter would be a reason (assumed).
 FORGIVEN, LEAK = 0.3, 0.005
 DIRECTIONS = 10.0  # in which such a remainder lies for every component at home (assumed)
 LUCK = 15.0  # whitened square that a free course at one component takes by luck (deviation of 120 knots' chance)
-MOSTLY = 0.5  # of what generic terms explain, or of their shape: an effect that is more of it is what they are
+MOSTLY, SHAPE = 0.6, 0.8  # of what generic terms explain, of their shape: an effect that is more of it is what they are
 LEAST = 3.0  # whitened size of a set's signature below which its form does not matter
 # Generic terms by which an effect that enters at a component may differ from the library's.
 ALIKE = {
@@ -152,8 +152,13 @@ def without(gram: FloatArray, first: int) -> tuple[FloatArray, FloatArray]:
     return inner, onto
 
 
+def shares(members: int) -> tuple[float, ...]:
+    """rho that a set may have: several effects with large remainders at home could be anything."""
+    return SHARES if members == 1 else SHARES[:-1]
+
+
 def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float,
-         places: int = 1) -> Form:
+         rho: Sequence[float] = SHARES, places: int = 1) -> Form:
     """What generic terms at home add to a set, averaged over the prior of another form.
 
     Args:
@@ -161,13 +166,14 @@ def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float,
         onto: of the terms with what the set leaves over [m].
         square: of `room` [m].
         misfit: whitened square that the set leaves over.
+        rho: of `shares`.
         places: components that are home.
     """
     used = np.flatnonzero((np.diag(inner) > 1e-9) & (square > 0.0))
     if not len(used):
         return Form((0.0,), (misfit,), ((np.inf, places),))
     logs, taken = [0.0], [0.0]
-    for share in SHARES:
+    for share in rho:
         most = share**2 * square[used]
         size = np.sqrt(most / np.diag(inner)[used])
         scaled = inner[np.ix_(used, used)] * size[:, None] * size
@@ -222,8 +228,8 @@ def _cosine(one: dict[int, float], other: dict[int, float], raw: FloatArray) -> 
 def is_own(fit: SetFit, unknown: UnknownFit, nothing: float, raw: FloatArray) -> bool:
     """Whether what generic terms take beside a set is another form of its effects, by place and by size or shape."""
     taken = fit.misfit - unknown.misfit
-    most = max(SHARES) ** 2 * max(nothing - fit.misfit, 0.0)
-    return at_home(unknown.component, fit.effects) and (taken <= most or alike(fit, unknown, raw) > MOSTLY)
+    most = max(shares(len(fit.families))) ** 2 * max(nothing - fit.misfit, 0.0)
+    return at_home(unknown.component, fit.effects) and (taken <= most or alike(fit, unknown, raw) > SHAPE)
 
 
 def split(fit: SetFit, fits: Sequence[UnknownFit], nothing: float,

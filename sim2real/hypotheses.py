@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
-from sim2real.form import MOSTLY, OTHER_FORM, SHARES, Form, alike, at_home, forgiven
+from sim2real.form import MOSTLY, OTHER_FORM, SHAPE, SHARES, Form, alike, at_home, forgiven
 from sim2real.generic import UnknownFit
 from sim2real.sets import SetFit
 from sim2real.singles import EffectFit
@@ -149,7 +149,7 @@ def is_home(h: Hypothesis, unknown: UnknownFit, nothing: float, raw: FloatArray)
     if len(h.effects) != 1 or h.unknown is not None or not at_home(unknown.component, h.effects):
         return False
     told = nothing - unknown.misfit
-    return told > 0.0 and (nothing - h.fit.misfit > MOSTLY * told or alike(h.fit, unknown, raw) > MOSTLY)
+    return told > 0.0 and (nothing - h.fit.misfit > MOSTLY * told or alike(h.fit, unknown, raw) > SHAPE)
 
 
 def forgive(found: Sequence[Hypothesis], nothing: float, least: float, bare: float = 0.0) -> list[Hypothesis]:

@@ -18,10 +18,10 @@ from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR, SURFACES
 from sim2real.predictor import TANGENT, Predictor
 from sim2real.reconstruct import Reconstruction
 
-# What disturbs the states beside gusts, per square root of second (assumed): as much as one-step maps of good models
-# differ. More would forget steady moments, which nothing else shows: seven times as much hid a tenth of a typical trim.
-WALK = {"u": 0.01, "v": 0.01, "w": 0.01, "p": 1e-4, "q": 1e-4, "r": 1e-4, "altitude": 0.05, "phi": 5e-5,
-        "theta": 5e-5}  # fmt: skip
+# What disturbs the states beside gusts, per square root of second (assumed). More on the rates would forget steady
+# moments, which nothing else shows; less on the velocities makes the colour of strong gusts look like something.
+WALK = {"u": 0.03, "v": 0.03, "w": 0.03, "p": 3e-4, "q": 3e-4, "r": 3e-4, "altitude": 0.05, "phi": 2e-4,
+        "theta": 2e-4}  # fmt: skip
 TRANSIENT = 10.0  # s with gains of their own after the start
 SPAN = 1.0  # s along a record that are flown as if at one condition
 ROUGH = 60  # steps after which a gust no longer shows in third differences

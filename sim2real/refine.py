@@ -17,7 +17,7 @@ from scipy.special import logsumexp
 from icing_env.record import FloatArray
 from sim2real.corrections import corrected, inherited
 from sim2real.courses import Remainder
-from sim2real.form import OTHER_FORM, SHARES, Form, gain, given, home, own_terms, room, split, with_terms
+from sim2real.form import OTHER_FORM, SHARES, Form, gain, given, home, own_terms, room, shares, split, with_terms
 from sim2real.generic import UnknownFit, fit_unknown
 from sim2real.hypotheses import (
     P_BESIDE,
@@ -116,7 +116,7 @@ class _Search:
         self.generic[i] = self._fit_unknown(left)
         if h.effects:
             rows, square = self._room(h, moved)
-            form = gain(left[np.ix_(rows, rows)], left[rows, 0], square, h.fit.misfit)
+            form = gain(left[np.ix_(rows, rows)], left[rows, 0], square, h.fit.misfit, shares(len(h.effects)))
             h = replace(h, form=replace(form, free=self._free(i, h.effects)), instead=None)
         else:
             self.nothing = h.fit.misfit
