@@ -16,7 +16,7 @@ from sim2real.sizes import in_powers
 
 
 def inherited(found: Sequence[Hypothesis], before: Sequence[Hypothesis], bases: Iterable[int],
-               points: Iterable[int]) -> list[Hypothesis]:
+              points: Iterable[int]) -> list[Hypothesis]:
     """Sets that were not flown, corrected by as much as the largest set within them was that was.
 
     What polynomials in its size miss of an effect they miss in every set that holds it; else the sets that nobody has

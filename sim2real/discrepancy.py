@@ -215,8 +215,7 @@ def _rows(flight: Reconstruction, only: Bank, known: SetFit, terms: Sequence[Cho
         nuisance.apply(rows, j, flight.power_from)
     sizes = np.tile(x, (len(rows), 1))
     sizes[first:] += np.eye(len(terms))
-    values: dict[str, dict[str, float | NDArray]] = {
-        f.effect.name: {f.parameter.name: size} for f, size in zip(known.families, known.estimate, strict=True)}
+    values: dict[str, dict[str, float | NDArray]] = {name: {**own} for name, own in known.values.items()}
     values["discrepancy"] = {**{t.number: sizes[:, j] * t.size for j, t in enumerate(terms)}, **at}
     return effects.with_effects(rows, values)
 

@@ -111,20 +111,18 @@ class _Search:
         h = corrected(h, self.points[i], self.linear)
         self.left[i] = self.flying.left_over(h.fit, self.points[i])
         left = self.left[i].reduced()
-        bank = self.flying.candidates
-        moved = tuple(replace(term, row=1 + j) for j, term in enumerate(bank.terms))
         self.generic[i] = self._fit_unknown(left)
         if h.effects:
-            rows, square = self._room(h, moved)
+            rows, square = self._room(h)
             form = gain(left[np.ix_(rows, rows)], left[rows, 0], square, h.fit.misfit, shares(len(h.effects)))
             h = replace(h, form=replace(form, free=self._free(i, h.effects)), instead=None)
         else:
             self.nothing = h.fit.misfit
         self.found[i] = h
 
-    def _room(self, h: Hypothesis, terms: Sequence[Term]) -> tuple[list[int], FloatArray]:
-        """Rows of the generic terms at home of a set, and what `room` there is for each."""
-        own = own_terms(h.effects, terms)
+    def _room(self, h: Hypothesis) -> tuple[list[int], FloatArray]:
+        """Rows of the generic terms at home of a set in what it leaves, and what `room` there is for each."""
+        own = own_terms(h.effects, _moved(self.flying.candidates.terms))
         return [term.row for term in own], room(h.fit, self.linear.reduced, own, self.nothing)
 
     def _free(self, i: int, effects: Sequence[str], *more: str) -> tuple[tuple[float, int], ...]:
@@ -195,8 +193,7 @@ class _Search:
 
     def _beside(self, i: int) -> tuple[UnknownFit | None, list[Hypothesis]]:
         """Terms of a flown set's form, and something unknown beside it (alone if it is empty), its own form allowed."""
-        known, bank = self.found[i], self.flying.candidates
-        moved = tuple(replace(term, row=1 + j) for j, term in enumerate(bank.terms))
+        known = self.found[i]
         left, gained, own = self.left[i].reduced(), 0.0, None
         fits = self.generic[i] if known.effects else [u for u in self.generic[i] if not self._named(u)]
         if known.effects and known.form is not None:
@@ -204,7 +201,7 @@ class _Search:
             ways = [known.form.way(k, self.nothing, self._least(), self._bare()) for k in range(len(known.form.gained))]
             if 0 < (k := int(np.argmax(ways))) <= len(SHARES):
                 gained = known.form.gained[k] + float(np.log(OTHER_FORM))
-                left = given(left, *self._room(known, moved), SHARES[k - 1])
+                left = given(left, *self._room(known), SHARES[k - 1])
                 fits = split(known.fit, self._fit_unknown(left), self.nothing, self.linear.raw)[1]
         if not fits:
             return own, []
@@ -220,9 +217,8 @@ class _Search:
     def _fit_unknown(self, left: FloatArray) -> list[UnknownFit]:
         """Generic terms on what a flown set leaves; their weights in rows of the bank."""
         bank = self.flying.candidates
-        moved = tuple(replace(term, row=1 + j) for j, term in enumerate(bank.terms))
         return [replace(u, weights={bank.terms[row - 1].row: w for row, w in u.weights.items()})
-                for u in fit_unknown(left, replace(bank, terms=moved))]
+                for u in fit_unknown(left, replace(bank, terms=_moved(bank.terms)))]
 
     def _named(self, unknown: UnknownFit) -> bool:
         """Whether generic terms alone are another form of a single effect of the library."""
@@ -246,3 +242,8 @@ class _Search:
         bare = self._bare()
         return replace(self.linear, hypotheses=normalised(forgive(kept, self.nothing, least, bare), 0.0), bare=bare,
                        settled=self.points[ranked[0]].nuisances)
+
+
+def _moved(terms: Sequence[Term]) -> tuple[Term, ...]:
+    """The terms with their rows in what a flown set leaves, itself being row 0."""
+    return tuple(replace(term, row=1 + j) for j, term in enumerate(terms))

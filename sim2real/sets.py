@@ -49,6 +49,11 @@ class SetFit:
     misfit: float = 0.0
 
     @property
+    def values(self) -> dict[str, dict[str, float]]:
+        """Estimates, by effect and parameter."""
+        return {f.effect.name: {f.parameter.name: size} for f, size in zip(self.families, self.estimate, strict=True)}
+
+    @property
     def effects(self) -> tuple[str, ...]:
         """Names, in the order of the families."""
         return tuple(f.effect.name for f in self.families)

@@ -86,8 +86,7 @@ def explained(evidence: Evidence, flight: Reconstruction, candidates: Bank, post
     best = posterior.best
     row = shifted(flight.parameters, candidates.nuisances, np.asarray(posterior.settled), flight.power_from)
     if best.effects:
-        row = effects.with_effects(row, {f.effect.name: {f.parameter.name: size}
-                                         for f, size in zip(best.fit.families, best.fit.estimate, strict=True)})
+        row = effects.with_effects(row, best.fit.values)
     moved, weights = replace(flight, parameters=row), best.unknown.weights if best.unknown else {}
     base = innovations(moved, row, evidence.gain.K)[:, 0]
     terms = [term for term in candidates.terms if term.row in weights]
