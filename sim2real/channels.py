@@ -24,3 +24,4 @@ NOISE_FLOOR: dict[str, float] = {
     "ax": 0.005, "ay": 0.005, "az": 0.005, "altitude": 0.2, "thrust_left": 15.0, "thrust_right": 15.0,
 }  # fmt: skip
 SURFACES = ("elevator", "aileron", "rudder")
+SURFACE_NOISE = 7.6e-4  # rad, of recorded positions: 0.03 deg (configs/instruments), 1.46 times that unfiltered

@@ -26,7 +26,6 @@ TRANSIENT = 10.0  # s with gains of their own after the start
 SPAN = 1.0  # s along a record that are flown as if at one condition
 ROUGH = 60  # steps after which a gust no longer shows in third differences
 DOUBLINGS = 16  # 65536 steps
-SURFACE_NOISE = 7.6e-4  # rad, of recorded positions: 0.03 deg (configs/instruments), 1.46 times that unfiltered
 
 
 @dataclass(frozen=True)
@@ -136,7 +135,7 @@ def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, 
     least = np.array([NOISE_FLOOR[name] for name in MEASURED[:FED_BACK]])
     columns = [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
     G, D = A[:, columns], C[:, columns]
-    Q = G @ Qw @ G.T + np.diag(walk) + SURFACE_NOISE**2 * (B @ B.T)
+    Q = G @ Qw @ G.T + np.diag(walk) + (B * flight.surface_noise**2) @ B.T
     R = np.diag(np.where(blank, 1e6, np.maximum(noise, least**2) / rate))
     return A, C, Q, D @ Qw @ D.T + R, G @ Qw @ D.T
 

@@ -51,7 +51,7 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
             own = [term for term in terms if term.component == name.replace("command", "path")]
             added = [predicted[:, 0] + path_course(flight, predicted[:, 0], term.name) for term in own]
             # of the record alone: what noise is believed must not depend on the row that stands first
-            noise = np.hypot(max(POSITION_NOISE, _spread(measured)), TIMING * np.gradient(measured, flight.dt))
+            noise = np.hypot(max(POSITION_NOISE, spread(measured)), TIMING * np.gradient(measured, flight.dt))
             noise *= _weight(flight)
             out.append(((measured[:, None] - np.column_stack([predicted, *added])) / noise[:, None],
                         rows + [term.row for term in own]))
@@ -212,5 +212,6 @@ def _without_line(left: FloatArray, lever: FloatArray) -> FloatArray:
     return left - base @ np.linalg.lstsq(base, left, rcond=None)[0]
 
 
-def _spread(values: FloatArray) -> float:
+def spread(values: FloatArray) -> float:
+    """Noise of a smooth series, from its third differences (their variance is 20 times that of white noise)."""
     return 1.4826 * float(np.median(np.abs(np.diff(values, 3)))) / np.sqrt(20.0)

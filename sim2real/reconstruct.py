@@ -8,7 +8,7 @@ choice that had to be made is kept in `notes`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from icing_env.atmosphere import density, pressure, static_air
 from icing_env.errors import InputError
 from icing_env.propulsion import power_available
 from icing_env.record import DataProblem, FlightRecord, FloatArray
-from sim2real.channels import LATERAL, MEASURED, NOISE_FLOOR, SURFACES
+from sim2real.channels import LATERAL, MEASURED, NOISE_FLOOR, SURFACE_NOISE, SURFACES
 
 LONGEST_STEP, SHORTEST_STEP = 0.1, 0.018  # s: records are 10 to 200 Hz; faster ones are thinned to about 50 Hz
 LONGITUDINAL = ("airspeed", "alpha", "q", "theta", "ax", "az", "elevator")
@@ -45,6 +45,7 @@ class Reconstruction:
         notes: what was assumed.
         known: accelerations (m/s2 along x, y, z, rad/s2 about them) that the model is given beside its own [N, 6]: what
             another simulator has and ours has not (`sim2real.rollout`).
+        surface_noise: standard deviation of the SURFACES in `controls` [3], rad, sample by sample.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Reconstruction:
     noise: FloatArray
     notes: tuple[str, ...]
     known: FloatArray | None = None
+    surface_noise: FloatArray = field(default_factory=lambda: np.full(len(SURFACES), SURFACE_NOISE))
 
     def channel(self, name: str) -> FloatArray:
         """One column of `measured`, gaps filled by interpolation; zeros where it was not recorded."""
