@@ -30,7 +30,7 @@ from sim2real.hypotheses import (
     forgive,
     homes,
     normalised,
-    pair_prior,
+    set_prior,
 )
 from sim2real.sets import INTEGRATED, SetFit, grow, integrate, pairs, sizes_tried
 from sim2real.singles import EffectFit, ambiguity, fit_family
@@ -145,20 +145,20 @@ def _several(reduced: FloatArray, bank: Bank, testable: list[int]) -> list[Hypot
     two = pairs(problem, testable, grid)
     three = grow(problem, two, testable, grid)
     out = []
-    for modes, log_prior in ((two, pair_prior(n)), (three, float(np.log(P_TRIPLES / (n * (n - 1) * (n - 2) / 6))))):
+    for modes in (two, three):
         best = np.argsort(-modes.log)[:INTEGRATED]
-        out += _merged([integrate(problem, modes, int(i)) for i in best], log_prior)
+        out += _merged([integrate(problem, modes, int(i)) for i in best], n)
     return out
 
 
-def _merged(fits: list[SetFit], log_prior: float) -> list[Hypothesis]:
+def _merged(fits: list[SetFit], testable: int) -> list[Hypothesis]:
     """One hypothesis for each set of names: where an effect has several parameters, the best of them."""
     chosen: dict[tuple[str, ...], SetFit] = {}
     for fit in fits:
         key = tuple(sorted(fit.effects))
         if key not in chosen or fit.log_evidence > chosen[key].log_evidence:
             chosen[key] = fit
-    return [Hypothesis(fit, None, log_prior, fit.log_evidence) for fit in chosen.values()]
+    return [Hypothesis(fit, None, set_prior(fit.effects, testable), fit.log_evidence) for fit in chosen.values()]
 
 
 def _form(reduced: FloatArray, bank: Bank, fit: SetFit) -> Form:

@@ -19,6 +19,7 @@ from scipy.special import logsumexp
 
 from icing_env import effects
 from icing_env.record import FloatArray
+from sim2real.candidates import Family
 from sim2real.generic import UnknownFit
 from sim2real.sets import SetFit
 from sim2real.terms import Term
@@ -29,6 +30,7 @@ SHARES = (0.15, 0.4, 0.8)
 # Of its signature, that a set may leave over for no reason that anybody could name; and where a component that it does
 # not enter would be a reason (assumed).
 FORGIVEN, LEAK = 0.3, 0.005
+UNKNOWN_FORGIVEN = 1.0  # the same of what generic terms explain where something unknown is (assumed)
 DIRECTIONS = 10.0  # in which such a remainder lies for every component at home (assumed)
 LUCK = 15.0  # whitened square that a free course at one component takes by luck (deviation of 120 knots' chance)
 MOSTLY, SHAPE = 0.6, 0.8  # of what generic terms explain, of their shape: an effect that is more of it is what they are
@@ -40,20 +42,34 @@ ALIKE = {
     "wind": ("x_force", "y_force", "z_force", "sensor:airspeed", "sensor:alpha", "sensor:beta",
              "sensor:altitude"),
 }
+# Where an effect may enter beside, in another form: a half wing that loses its roll loses lift and gains drag.
+ALSO = {"asymmetric_ice": ("x_force", "z_force")}
+
+
+@dataclass(frozen=True)
+class Liberty:
+    """Where a set may be of another form.
+
+    free: whitened square that a free course of time would take there of what the set leaves, beyond chance; places:
+    components that it has; most: whitened square that it may leave there for no reason that anybody could name.
+    """
+
+    free: float = np.inf
+    places: int = 1
+    most: float = np.inf
 
 
 @dataclass(frozen=True)
 class Form:
     """A set in another form, by how much generic terms at home may take (nothing first).
 
-    gained: log evidence that they add, prior included; left: whitened square after them; free: as much of the first of
-    these as a free course of time at home would take, beyond chance, and at how many components: at the home of each
+    gained: log evidence that they add, prior included; left: whitened square after them; free: at the home of each
     member, then of all.
     """
 
     gained: tuple[float, ...]
     left: tuple[float, ...]
-    free: tuple[tuple[float, int], ...] = ((np.inf, 1),)
+    free: tuple[Liberty, ...] = (Liberty(),)
 
     @property
     def least(self) -> float:
@@ -73,16 +89,16 @@ class Form:
     def way(self, k: int, nothing: float, noise: float, bare: float) -> float:
         """The same of one way, by how much the terms may take."""
         left = self.left[k]
-        found = [forgiven(left - noise, nothing - left, max(self.left[0] - free - bare, 0.0), places)
-                 for free, places in self.free]
+        found = [forgiven(left - noise, nothing - left, max(self.left[0] - at.free - bare, 0.0), at.places, at.most)
+                 for at in self.free]
         return self.gained[k] + float(logsumexp(found) - np.log(len(found)))
 
     def bare(self) -> float:
         """Whitened square that is left beside free courses of time, a little for luck."""
-        return min(self.left[0] - free + LUCK * places for free, places in self.free)
+        return min(self.left[0] - at.free + LUCK * at.places for at in self.free)
 
 
-def forgiven(left: float, explained: float, foreign: float = 0.0, places: int = 1) -> float:
+def forgiven(left: float, explained: float, foreign: float = 0.0, places: int = 1, most: float = np.inf) -> float:
     """Log evidence that a remainder regains where its scale is unknown.
 
     Args:
@@ -90,13 +106,14 @@ def forgiven(left: float, explained: float, foreign: float = 0.0, places: int = 
         explained: whitened square explained.
         foreign: as much of `left` as could not come from where the set enters.
         places: components at which it may lie.
+        most: that may be left there.
     """
     left, explained = max(left, 0.0), max(explained, 0.0)
     elsewhere = min(max(foreign, 0.0), left)
     leaked = min(elsewhere, LEAK**2 * explained)
-    most = leaked + min(left - elsewhere, FORGIVEN**2 * explained - leaked)
+    excused = leaked + min(left - elsewhere, FORGIVEN**2 * explained - leaked, most)
     directions = DIRECTIONS * places
-    return float(0.5 * most - 0.5 * directions * np.log1p(most / directions))
+    return float(0.5 * excused - 0.5 * directions * np.log1p(excused / directions))
 
 
 def own_terms(names: Iterable[str], terms: Sequence[Term]) -> list[Term]:
@@ -116,7 +133,20 @@ def at_home(component: str, names: Iterable[str]) -> bool:
 
 
 def _places(name: str) -> set[str]:
-    return {c for at in effects.LIBRARY[name].enters_at for c in ALIKE.get(at, (at,))}
+    return {c for at in effects.LIBRARY[name].enters_at for c in ALIKE.get(at, (at,))} | set(ALSO.get(name, ()))
+
+
+def energies(fit: SetFit, reduced: FloatArray, explained: float) -> list[float]:
+    """Whitened square of each member's own signature, no more than the set explains; of one alone all of that."""
+    if len(fit.families) == 1:
+        return [explained]
+    return [min(_energy(fit, family, reduced), explained) for family in fit.families]
+
+
+def _energy(fit: SetFit, family: Family, reduced: FloatArray) -> float:
+    rows = [row for row in family.rows if row in (fit.weights or {})]
+    w = np.array([(fit.weights or {})[row] for row in rows])
+    return float(w @ reduced[np.ix_(rows, rows)] @ w)
 
 
 def room(fit: SetFit, reduced: FloatArray, terms: Sequence[Term], nothing: float) -> FloatArray:
@@ -130,9 +160,7 @@ def room(fit: SetFit, reduced: FloatArray, terms: Sequence[Term], nothing: float
     explained = max(nothing - fit.misfit, 0.0)
     out = np.zeros(len(terms))
     for family in fit.families:
-        rows = [row for row in family.rows if row in (fit.weights or {})]
-        w = np.array([(fit.weights or {})[row] for row in rows])
-        energy = min(float(w @ reduced[np.ix_(rows, rows)] @ w), explained)
+        energy = min(_energy(fit, family, reduced), explained)
         own = np.array([term.component in _places(family.effect.name) for term in terms])
         if energy > LEAST**2 and own.any():
             out += own * energy / np.count_nonzero(own)
@@ -171,7 +199,7 @@ def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float,
     """
     used = np.flatnonzero((np.diag(inner) > 1e-9) & (square > 0.0))
     if not len(used):
-        return Form((0.0,), (misfit,), ((np.inf, places),))
+        return Form((0.0,), (misfit,), (Liberty(places=places),))
     logs, taken = [0.0], [0.0]
     for share in rho:
         most = share**2 * square[used]
@@ -184,7 +212,7 @@ def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float,
         logs.append(min(log, 0.5 * float(most.sum())))
         taken.append(min(float(2.0 * at @ along - at @ scaled @ at), float(most.sum())))
     return Form(tuple(log - float(np.log(len(logs))) for log in logs), tuple(misfit - t for t in taken),
-                ((np.inf, places),))
+                (Liberty(places=places),))
 
 
 def given(left: FloatArray, rows: Sequence[int], square: FloatArray, share: float) -> FloatArray:

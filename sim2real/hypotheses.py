@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.special import logsumexp
 
+from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.form import MOSTLY, OTHER_FORM, SHAPE, SHARES, Form, alike, at_home, forgiven
 from sim2real.generic import UnknownFit
@@ -16,6 +17,7 @@ from sim2real.singles import EffectFit
 
 # Prior (assumed): what is left is shared by single effects. A pair is about one per cent as likely as either member.
 P_NONE, P_UNKNOWN, P_PAIRS, P_TRIPLES, P_BESIDE = 0.5, 0.05, 0.07, 0.002, 0.007
+SAME_PLACE = 0.02  # of that where one member enters nowhere but where another does: another form of it is likelier
 KEPT = 1e-5  # sets of several effects less probable than this are dropped
 
 
@@ -120,9 +122,13 @@ class Posterior:
                    + [u.misfit for u in self.unknown_fits])  # fmt: skip
 
 
-def pair_prior(effects: int) -> float:
-    """Log prior probability of each pair of so many effects."""
-    return float(np.log(P_PAIRS / (effects * (effects - 1) / 2)))
+def set_prior(names: Sequence[str], testable: int) -> float:
+    """Log prior probability of a pair or triple of `testable` effects."""
+    n = testable
+    share = P_PAIRS / (n * (n - 1) / 2) if len(names) == 2 else P_TRIPLES / (n * (n - 1) * (n - 2) / 6)
+    at = [set(effects.LIBRARY[name].enters_at) for name in names]
+    within = sum(any(a <= b for b in at[:i]) or any(a < b for b in at[i + 1 :]) for i, a in enumerate(at))
+    return float(np.log(share) + within * np.log(SAME_PLACE))
 
 
 def homes(found: Sequence[Hypothesis], alone: Sequence[UnknownFit], nothing: float,

@@ -17,7 +17,23 @@ from scipy.special import logsumexp
 from icing_env.record import FloatArray
 from sim2real.corrections import corrected, inherited
 from sim2real.courses import Remainder
-from sim2real.form import OTHER_FORM, SHARES, Form, gain, given, home, own_terms, room, shares, split, with_terms
+from sim2real.form import (
+    FORGIVEN,
+    OTHER_FORM,
+    SHARES,
+    UNKNOWN_FORGIVEN,
+    Form,
+    Liberty,
+    energies,
+    gain,
+    given,
+    home,
+    own_terms,
+    room,
+    shares,
+    split,
+    with_terms,
+)
 from sim2real.generic import UnknownFit, fit_unknown
 from sim2real.hypotheses import (
     P_BESIDE,
@@ -28,7 +44,7 @@ from sim2real.hypotheses import (
     forgive,
     is_home,
     normalised,
-    pair_prior,
+    set_prior,
 )
 from sim2real.points import Flying, Point
 from sim2real.sets import SetFit
@@ -115,7 +131,7 @@ class _Search:
         if h.effects:
             rows, square = self._room(h)
             form = gain(left[np.ix_(rows, rows)], left[rows, 0], square, h.fit.misfit, shares(len(h.effects)))
-            h = replace(h, form=replace(form, free=self._free(i, h.effects)), instead=None)
+            h = replace(h, form=replace(form, free=self._free(i, h.fit)), instead=None)
         else:
             self.nothing = h.fit.misfit
         self.found[i] = h
@@ -125,12 +141,25 @@ class _Search:
         own = own_terms(h.effects, _moved(self.flying.candidates.terms))
         return [term.row for term in own], room(h.fit, self.linear.reduced, own, self.nothing)
 
-    def _free(self, i: int, effects: Sequence[str], *more: str) -> tuple[tuple[float, int], ...]:
-        """What free courses of time would take: at home of each effect, or at `more`; then at all of these."""
-        each = [home((name,)) for name in effects] + [{component} for component in more]
+    def _free(self, i: int, fit: SetFit, beside: UnknownFit | None = None) -> tuple[Liberty, ...]:
+        """What free courses of time would take: at home of each effect, or where something unknown is; then at all.
+
+        What a member may leave there goes with what it explains: one that explains little would else be named for the
+        freedom of its home.
+        """
+        each = [home((family.effect.name,)) for family in fit.families]
+        most = [FORGIVEN**2 * e for e in energies(fit, self.linear.reduced, max(self.nothing - fit.misfit, 0.0))]
+        taken = 0.0
+        if beside is not None:
+            taken = fit.misfit - beside.misfit
+            each, most = [*each, {beside.component}], [*most, UNKNOWN_FORGIVEN**2 * taken]
+        found = [Liberty(max(self.flying.courses.free(self.left[i], at) - taken, 0.0), len(at), share)
+                 for at, share in zip(each, most, strict=True)]
         together = set().union(*each)
-        places = [*each, together] if len(each) > 1 and len(together) <= FEW_PLACES else each
-        return tuple((self.flying.courses.free(self.left[i], at), len(at)) for at in places)
+        if len(each) > 1 and len(together) <= FEW_PLACES:
+            free = max(self.flying.courses.free(self.left[i], together) - taken, 0.0)
+            found.append(Liberty(free, len(together), sum(min(at.free, at.most) for at in found)))
+        return tuple(found)
 
     def nothing_at_all(self) -> int:
         """Index of no gap."""
@@ -186,7 +215,7 @@ class _Search:
             if i not in self.points:
                 self.found[i] = replace(self.found[i], fit=fit)
             return i
-        self.found.append(Hypothesis(fit, None, pair_prior(len(self.linear.fits)), fit.log_evidence))
+        self.found.append(Hypothesis(fit, None, set_prior(names, len(self.linear.fits)), fit.log_evidence))
         self.before.append(self.found[-1])
         self.added.add(len(self.found) - 1)
         return len(self.found) - 1
@@ -207,12 +236,10 @@ class _Search:
             return own, []
         best = max(fits, key=lambda u: u.log_evidence)
         more = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
-        taken = known.fit.misfit - best.misfit
-        free = tuple((max(f - taken, 0.0), n) for f, n in self._free(i, known.effects, best.component))
         prior = np.log(P_BESIDE / (1.0 - P_NONE)) + known.log_prior if known.effects else np.log(P_UNKNOWN)
         return own, [Hypothesis(known.fit, best, float(prior),
                                 known.log_evidence + gained + more,
-                                Form((0.0,), (best.misfit,), free))]
+                                Form((0.0,), (best.misfit,), self._free(i, known.fit, best)))]
 
     def _fit_unknown(self, left: FloatArray) -> list[UnknownFit]:
         """Generic terms on what a flown set leaves; their weights in rows of the bank."""

@@ -38,7 +38,7 @@ def placed(flight: Reconstruction) -> Reconstruction:
 
 
 def _law(flight: Reconstruction, command: FloatArray, surface: str) -> FloatArray | None:
-    """Positions [N] before the recording's low pass as the command makes them; None if that is not what was recorded."""
+    """Positions [N] before the recording's low pass, as the command makes them; None if they were not those."""
     recorded = flight.positions[surface]
     rows = np.repeat(flight.parameters, len(LAGS))
     rows[f"{surface}_lag"] = np.maximum(rows[f"{surface}_lag"] + LAGS, 0.0)
