@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from icing_env.record import FloatArray
-from sim2real.form import Form
+from sim2real.form import Form, shares
 from sim2real.hypotheses import Hypothesis, Posterior
 from sim2real.points import Point
 from sim2real.sets import Modes, SetFit, integrate
@@ -20,14 +20,14 @@ def inherited(found: Sequence[Hypothesis], before: Sequence[Hypothesis], bases: 
     """Sets that were not flown, corrected by as much as the largest set within them was that was.
 
     What polynomials in its size miss of an effect they miss in every set that holds it; else the sets that nobody has
-    flown yet would always look best.
+    flown yet would always look best. Of sets as large, by the one that lost most.
     """
     flown, out = [j for j in bases if found[j].effects], list(found)
     for i, h in enumerate(before):
         within = [j for j in flown if set(before[j].effects) <= set(h.effects)]
         if i in points or not within:
             continue
-        nearest = max(within, key=lambda j: len(before[j].effects))
+        nearest = min(within, key=lambda j: (-len(before[j].effects), found[j].log_evidence - before[j].log_evidence))
         now, then = found[nearest], before[nearest]
         more = now.fit.misfit - then.fit.misfit
         form, unknown = h.form, h.unknown
@@ -41,14 +41,15 @@ def inherited(found: Sequence[Hypothesis], before: Sequence[Hypothesis], bases: 
 
 
 def _moved(form: Form, now: Hypothesis, then: Hypothesis) -> Form:
-    """A form corrected by as much as that of a set within was."""
+    """A form corrected by as much as that of a set within was, in the ways that all sets have."""
     more, one, other = now.fit.misfit - then.fit.misfit, now.form, then.form
-    if one is None or other is None or not len(form.gained) == len(one.gained) == len(other.gained):
-        return Form(form.gained, tuple(left + more for left in form.left),
-                    form.free if one is None else one.free)
-    ways = range(len(form.gained))
-    return Form(tuple(form.gained[k] + one.gained[k] - other.gained[k] for k in ways),
-                tuple(form.left[k] + one.left[k] - other.left[k] for k in ways), one.free)
+    gained, left = list(form.gained), [left + more for left in form.left]
+    if one is None or other is None:
+        return replace(form, left=tuple(left))
+    for k in range(min(len(shares(2)) + 1, *(len(f.gained) for f in (form, one, other)))):
+        gained[k] += one.gained[k] - other.gained[k]
+        left[k] = form.left[k] + one.left[k] - other.left[k]
+    return Form(tuple(gained), tuple(left), one.free)
 
 
 def corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior) -> Hypothesis:

@@ -68,14 +68,15 @@ class Courses:
     def __init__(self, evidences: Sequence[Evidence], tempering: float) -> None:
         self.evidences, self.tempering = evidences, tempering
         self._flown: dict[str, list[FloatArray]] = {}
+        self._terms: list[tuple[FloatArray, FloatArray]] = []
         self._freed: dict[tuple[str, ...], list[Freed]] = {}
 
-    def of_terms(self, terms: Sequence[Term]) -> list[FloatArray]:
-        """What generic terms make of every record [N x channels, terms]; always the same ones."""
-        if "" not in self._flown:
-            self._flown[""] = [_flown(e, [replace(term, row=1 + j) for j, term in enumerate(terms)])
-                               for e in self.evidences]  # fmt: skip
-        return self._flown[""]
+    def of_terms(self, terms: Sequence[Term]) -> list[tuple[FloatArray, FloatArray]]:
+        """What generic terms make of every record [N x channels, terms], and its inner products; always the same."""
+        if not self._terms:
+            moved = [replace(term, row=1 + j) for j, term in enumerate(terms)]
+            self._terms = [(rows, rows.T @ rows) for rows in (_flown(e, moved) for e in self.evidences)]
+        return self._terms
 
     def at(self, components: Collection[str]) -> list[Freed]:
         """Free courses at some components, for every record; none if they are paths only."""

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from icing_env.jit import entry
 from icing_env.record import FloatArray
 from sim2real.candidates import Bank, parameter_rows
 from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR
@@ -88,14 +90,12 @@ def compare(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gai
     kept = np.zeros(((len(left) - first) * len(MEASURED), len(keep)))
     at = [(i, index[row]) for i, row in enumerate(keep) if row in index]
     for k in range(first, len(left), CHUNK):
-        part = np.clip(whiten(left[k : k + CHUNK], factor[k : k + CHUNK]), -FARTHEST, FARTHEST)
-        whitened[k : k + CHUNK] = part[:, 0]
-        samples += int(np.count_nonzero(part[:, 0]))
-        flat = part.transpose(0, 2, 1).reshape(-1, len(moved))
-        flat[:, 1:] -= flat[:, :1]
+        flat = np.empty((len(left[k : k + CHUNK]) * len(MEASURED), len(moved)))
+        _departures(left[k : k + CHUNK], factor[k : k + CHUNK], FARTHEST, flat)
+        whitened[k : k + CHUNK] = flat[:, 0].reshape(-1, len(MEASURED))
+        samples += int(np.count_nonzero(flat[:, 0]))
         for i, j in at:
             kept[(k - first) * len(MEASURED) :][: len(flat), i] = flat[:, j]
-        flat = flat[np.any(flat != 0.0, axis=1)]  # a sparse channel's blanks
         flown += flat.T @ flat
     gram = np.zeros((len(rows), len(rows)))
     gram[np.ix_(moved, moved)] = flown
@@ -166,6 +166,27 @@ def whitening(left: FloatArray, gain: Gain, flight: Reconstruction) -> FloatArra
 def whiten(left: FloatArray, factor: FloatArray) -> FloatArray:
     """[N, rows, channels] whitened by one matrix or one per step; what was not measured counts as zero."""
     return np.asarray(np.where(np.isfinite(left), left, 0.0) @ np.swapaxes(factor, -1, -2))
+
+
+@entry
+def _departures(left: Any, factor: Any, farthest: float, out: Any) -> None:
+    """The first row whitened as `whiten` does, and the others' departures from it, none beyond `farthest`.
+
+    Args:
+        left: [N, rows, channels], nan where nothing was measured.
+        factor: [N, channels, channels], lower triangles.
+        out: [N x channels, rows].
+    """
+    steps, count, channels = left.shape
+    for k in range(steps):
+        for i in range(count):
+            for c in range(channels):
+                total = 0.0
+                for d in range(c + 1):
+                    if np.isfinite(left[k, i, d]):
+                        total += factor[k, c, d]*left[k, i, d]
+                total = min(max(total, -farthest), farthest)
+                out[k*channels + c, i] = total if i == 0 else total - out[k*channels + c, 0]
 
 
 def _spread(values: NDArray[np.floating]) -> float:

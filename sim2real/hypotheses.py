@@ -10,7 +10,7 @@ from scipy.special import logsumexp
 
 from icing_env import effects
 from icing_env.record import FloatArray
-from sim2real.form import MOSTLY, OTHER_FORM, SHAPE, SHARES, Form, alike, at_home, forgiven
+from sim2real.form import ALSO, MOSTLY, OTHER_FORM, SHAPE, SHARES, Form, alike, at_home, forgiven
 from sim2real.generic import UnknownFit
 from sim2real.sets import SetFit
 from sim2real.singles import EffectFit
@@ -126,9 +126,8 @@ def set_prior(names: Sequence[str], testable: int) -> float:
     """Log prior probability of a pair or triple of `testable` effects."""
     n = testable
     share = P_PAIRS / (n * (n - 1) / 2) if len(names) == 2 else P_TRIPLES / (n * (n - 1) * (n - 2) / 6)
-    at = [set(effects.LIBRARY[name].enters_at) for name in names]
-    within = sum(any(a <= b for b in at[:i]) or any(a < b for b in at[i + 1 :]) for i, a in enumerate(at))
-    return float(np.log(share) + within * np.log(SAME_PLACE))
+    guest = any(within(name, [other for other in names if other != name]) for name in names)
+    return float(np.log(share) + (np.log(SAME_PLACE) if guest else 0.0))
 
 
 def homes(found: Sequence[Hypothesis], alone: Sequence[UnknownFit], nothing: float,
@@ -166,7 +165,31 @@ def forgive(found: Sequence[Hypothesis], nothing: float, least: float, bare: flo
         least: what noise alone would leave.
         bare: the same beside free courses of time, where these are known.
     """
-    return [replace(h, regained=_regained(h, nothing, least, bare)) for h in found]
+    alone = [replace(h, regained=_regained(h, nothing, least, bare)) for h in found]
+    return [_with_guests(h, alone, nothing) for h in alone]
+
+
+def _with_guests(h: Hypothesis, found: Sequence[Hypothesis], nothing: float) -> Hypothesis:
+    """A set with what larger ones gain by a member that enters nowhere but where one of its own does.
+
+    An actuator of second order looks like lag with some gearing: a little of another effect, at the same place as one
+    that explains most, is another form of that.
+    """
+    if not h.effects or h.unknown is not None:
+        return h
+    gained = [g.log_evidence + g.regained - h.log_evidence for g in found
+              if g.unknown is None and len(g.effects) == len(h.effects) + 1 and set(h.effects) < set(g.effects)
+              and all(within(name, h.effects) for name in set(g.effects) - set(h.effects))
+              and nothing - h.fit.misfit > MOSTLY * (nothing - g.fit.misfit)]
+    if not gained:
+        return h
+    return replace(h, regained=float(np.logaddexp(h.regained, max(gained) + np.log(OTHER_FORM / len(SHARES)))))
+
+
+def within(name: str, others: Sequence[str]) -> bool:
+    """Whether an effect enters nowhere but where one of some others does."""
+    places = set(effects.LIBRARY[name].enters_at)
+    return any(places <= {*effects.LIBRARY[other].enters_at, *ALSO.get(other, ())} for other in others)
 
 
 def _regained(h: Hypothesis, nothing: float, least: float, bare: float) -> float:

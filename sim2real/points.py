@@ -99,14 +99,16 @@ class Flying:
         first, steps = 1 + k + n, _steps(fit, point.sizes)
         moved = tuple(replace(term, row=first + j) for j, term in enumerate(terms))
         gram, kept, left_in = np.zeros((first + len(terms),) * 2), [], dict.fromkeys(PATHS, 0.0)
-        for flight, evidence, generic in zip(self.flights, self.evidences, self.courses.of_terms(terms), strict=True):
+        for flight, evidence, (generic, inner) in zip(self.flights, self.evidences, self.courses.of_terms(terms),
+                                                      strict=True):
             rows = _rows(flight, self.candidates, fit, point.sizes, steps, point.nuisances)
             for component in PATHS:
                 left_in[component] += excess(flight, rows[:1], component) / self.tempering
             own = compare(flight, rows, (), evidence.gain, evidence.factor, keep=range(first)).rows
-            both = np.concatenate([own, generic], axis=1)
+            across = own.T @ generic
             rows = np.concatenate([rows, np.repeat(rows[:1], len(terms))])
-            gram += (both.T @ both + path_gram(flight, rows, moved, round(SETTLE / flight.dt))) / self.tempering
+            gram += (np.block([[own.T @ own, across], [across.T, inner]])
+                     + path_gram(flight, rows, moved, round(SETTLE / flight.dt))) / self.tempering
             kept.append(own)
         precision = self.baseline.precision
         gram[first - n : first, first - n : first] += precision
