@@ -100,7 +100,7 @@ def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision
     found += _several(reduced, bank, [i for i, f in enumerate(bank.families) if f in by_family])
     found = [replace(h, form=_form(reduced, bank, h.fit)) if h.effects else h for h in found]
     found, unknown_fits = homes(found, fit_unknown(reduced, bank), float(reduced[0, 0]), gram)
-    least = min([h.left for h in found] + [u.misfit for u in unknown_fits] + [noise])
+    least = min([h.left for h in found] + [u.left for u in unknown_fits] + [noise])
     found = forgive(found, float(reduced[0, 0]), least)
     few = [h for h in found if len(h.effects) <= MOST_BESIDE]
     leading = sorted(few, key=lambda h: -h.log_posterior)[:BESIDE]

@@ -63,8 +63,8 @@ class Liberty:
 class Form:
     """A set in another form, by how much generic terms at home may take (nothing first).
 
-    gained: log evidence that they add, prior included; left: whitened square after them; free: at the home of each
-    member, then of all.
+    gained: log evidence that they add, prior included; left: whitened square after them, luck taken out; free: at the
+    home of each member, then of all.
     """
 
     gained: tuple[float, ...]
@@ -210,7 +210,9 @@ def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float,
         log = 0.5 * float(along @ at) - 0.5 * float(np.linalg.slogdet(np.eye(len(used)) + scaled)[1])
         # a Gaussian prior alone would not forbid a larger remainder
         logs.append(min(log, 0.5 * float(most.sum())))
-        taken.append(min(float(2.0 * at @ along - at @ scaled @ at), float(most.sum())))
+        share_of = np.linalg.solve(np.eye(len(used)) + scaled, scaled)  # of noise, that so many terms take
+        luck = float(2.0 * np.trace(share_of) - np.sum(share_of * share_of.T))
+        taken.append(min(max(float(2.0 * at @ along - at @ scaled @ at) - luck, 0.0), float(most.sum())))
     return Form(tuple(log - float(np.log(len(logs))) for log in logs), tuple(misfit - t for t in taken),
                 (Liberty(places=places),))
 
@@ -272,4 +274,4 @@ def with_terms(form: Form | None, own: UnknownFit | None) -> Form | None:
     if own is None or form is None:
         return form
     gained = own.log_evidence - float(np.log(len(SHARES)))
-    return replace(form, gained=(*form.gained, gained), left=(*form.left, own.misfit))
+    return replace(form, gained=(*form.gained, gained), left=(*form.left, own.left))

@@ -5,6 +5,7 @@ Linear-Gaussian terms (constant, linear, quadratic, drifting) whose coefficients
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +14,10 @@ from scipy.special import logsumexp
 from icing_env.record import FloatArray
 from sim2real.candidates import Bank
 from sim2real.sets import SetFit
+from sim2real.terms import Term
 
 SCALES = (0.5, 1.0, 2.0)  # sizes of generic terms, in their own unit (assumed)
+IN_STEP = 0.03  # of the unit of a channel's lag: 3 ms, by which channels are out of step for no reason (assumed)
 STEP = 1e-3  # of an effect's range, for the slope of its signature
 
 
@@ -27,6 +30,11 @@ class UnknownFit:
     terms: tuple[tuple[str, float, float], ...]
     misfit: float
     weights: dict[int, float]
+
+    @property
+    def left(self) -> float:
+        """Whitened square that it leaves, less the luck of so many terms."""
+        return self.misfit + len(self.terms)
 
 
 def beside(reduced: FloatArray, bank: Bank, fit: SetFit, slopes: list[dict[int, float]]) -> FloatArray:
@@ -48,6 +56,13 @@ def beside(reduced: FloatArray, bank: Bank, fit: SetFit, slopes: list[dict[int, 
     onto = change @ reduced @ moved.T
     inner = change @ reduced @ change.T + 1e-2 * np.eye(len(slopes))
     return np.asarray(out - onto.T @ np.linalg.solve(inner, onto))
+
+
+def _by_timing(terms: Sequence[Term], T: FloatArray, t: FloatArray) -> float:
+    """Log evidence that a channel slightly out of step would have: it needs nothing unknown."""
+    gained = [0.5 * IN_STEP**2 * t[i] ** 2 / (1.0 + IN_STEP**2 * T[i, i]) - 0.5 * np.log1p(IN_STEP**2 * T[i, i])
+              for i, term in enumerate(terms) if term.name == f"{term.target}_dot"]  # fmt: skip
+    return float(max([0.0, *gained]))
 
 
 def fit_unknown(reduced: FloatArray, bank: Bank) -> list[UnknownFit]:
@@ -76,7 +91,8 @@ def fit_unknown(reduced: FloatArray, bank: Bank) -> list[UnknownFit]:
             _, mean, error = max(joint, key=lambda one: one[0])
             kept = list(range(len(rows)))
         found = tuple((terms[i].name, float(m), float(e)) for i, m, e in zip(kept, mean, error, strict=True))
-        out.append(UnknownFit(component, float(np.logaddexp(together, single)), found,
+        log = float(np.logaddexp(together, single)) - _by_timing(terms, T, t)
+        out.append(UnknownFit(component, log, found,
                               float(reduced[0, 0] - mean @ t[kept]),
                               {rows[i]: float(m) for i, m in zip(kept, mean, strict=True)}))
     return out

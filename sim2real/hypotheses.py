@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -51,9 +51,9 @@ class Hypothesis:
     @property
     def left(self) -> float:
         """Whitened square that it leaves over at best, other forms included."""
-        own = self.unknown.misfit if self.unknown else self.fit.misfit
+        own = self.unknown.left if self.unknown else self.fit.misfit
         forms = [] if self.form is None else [self.form.least]
-        return min([own, *forms, *([] if self.instead is None else [self.instead.misfit])])
+        return min([own, *forms, *([] if self.instead is None else [self.instead.left])])
 
     @property
     def weights(self) -> dict[int, float]:
@@ -157,19 +157,22 @@ def is_home(h: Hypothesis, unknown: UnknownFit, nothing: float, raw: FloatArray)
     return told > 0.0 and (nothing - h.fit.misfit > MOSTLY * told or alike(h.fit, unknown, raw) > SHAPE)
 
 
-def forgive(found: Sequence[Hypothesis], nothing: float, least: float, bare: float = 0.0) -> list[Hypothesis]:
+def forgive(found: Sequence[Hypothesis], nothing: float, least: float, bare: float = 0.0,
+            believed: Collection[int] | None = None) -> list[Hypothesis]:
     """Hypotheses with what another form, and a remainder that is forgiven, regain.
 
     Args:
         nothing: whitened square that no explanation at all leaves.
         least: what noise alone would leave.
         bare: the same beside free courses of time, where these are known.
+        believed: indices of the sets whose evidence is believed when it serves smaller ones; all if omitted.
     """
     alone = [replace(h, regained=_regained(h, nothing, least, bare)) for h in found]
-    return [_with_guests(h, alone, nothing) for h in alone]
+    larger = alone if believed is None else [alone[i] for i in believed]
+    return [_with_guests(h, larger, nothing) for h in alone]
 
 
-def _with_guests(h: Hypothesis, found: Sequence[Hypothesis], nothing: float) -> Hypothesis:
+def _with_guests(h: Hypothesis, larger: Sequence[Hypothesis], nothing: float) -> Hypothesis:
     """A set with what larger ones gain by a member that enters nowhere but where one of its own does.
 
     An actuator of second order looks like lag with some gearing: a little of another effect, at the same place as one
@@ -177,7 +180,7 @@ def _with_guests(h: Hypothesis, found: Sequence[Hypothesis], nothing: float) -> 
     """
     if not h.effects or h.unknown is not None:
         return h
-    gained = [g.log_evidence + g.regained - h.log_evidence for g in found
+    gained = [g.log_evidence + g.regained - h.log_evidence for g in larger
               if g.unknown is None and len(g.effects) == len(h.effects) + 1 and set(h.effects) < set(g.effects)
               and all(within(name, h.effects) for name in set(g.effects) - set(h.effects))
               and nothing - h.fit.misfit > MOSTLY * (nothing - g.fit.misfit)]
@@ -187,9 +190,10 @@ def _with_guests(h: Hypothesis, found: Sequence[Hypothesis], nothing: float) -> 
 
 
 def within(name: str, others: Sequence[str]) -> bool:
-    """Whether an effect enters nowhere but where one of some others does."""
-    places = set(effects.LIBRARY[name].enters_at)
-    return any(places <= {*effects.LIBRARY[other].enters_at, *ALSO.get(other, ())} for other in others)
+    """Whether an effect enters nowhere but where one of some others does; what mass does enters everywhere."""
+    places = set(effects.LIBRARY[name].enters_at) - {"mass"}
+    there = [{*effects.LIBRARY[other].enters_at, *ALSO.get(other, ())} for other in others]
+    return bool(places) and any(places <= at for at in there)
 
 
 def _regained(h: Hypothesis, nothing: float, least: float, bare: float) -> float:
@@ -199,7 +203,7 @@ def _regained(h: Hypothesis, nothing: float, least: float, bare: float) -> float
         return h.form.regained(nothing, least, bare)
     other = h.form.regained(nothing, least, bare)
     if h.instead is not None:
-        left = h.instead.misfit
+        left = h.instead.left
         alone = h.instead.log_evidence - h.log_evidence + forgiven(left - least, nothing - left)
         other = float(np.logaddexp(other, alone - np.log(len(SHARES))))
     return float(np.logaddexp(np.log(1.0 - OTHER_FORM), np.log(OTHER_FORM) + other))

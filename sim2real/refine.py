@@ -105,7 +105,7 @@ class _Search:
             if i not in self.points:
                 self._fly(i)
         found = inherited(self.found, self.before, [j for j in self.points if j not in self.added], self.points)
-        self.found = forgive(found, self.nothing, self._least(), self._bare())
+        self.found = forgive(found, self.nothing, self._least(), self._bare(), list(self.points))
 
     def best(self) -> int:
         """The most probable known set, flown or not."""
@@ -239,7 +239,7 @@ class _Search:
         prior = np.log(P_BESIDE / (1.0 - P_NONE)) + known.log_prior if known.effects else np.log(P_UNKNOWN)
         return own, [Hypothesis(known.fit, best, float(prior),
                                 known.log_evidence + gained + more,
-                                Form((0.0,), (best.misfit,), self._free(i, known.fit, best)))]
+                                Form((0.0,), (best.left,), self._free(i, known.fit, best)))]
 
     def _fit_unknown(self, left: FloatArray) -> list[UnknownFit]:
         """Generic terms on what a flown set leaves; their weights in rows of the bank."""
@@ -263,12 +263,12 @@ class _Search:
             found[i] = replace(found[i], form=with_terms(found[i].form, own))
             others += beside
         bound = found[ranked[0]].log_posterior
-        kept = [h for i, h in enumerate(found)
-                if i in self.points or (h.unknown is None and h.log_posterior < bound)] + others
+        chosen = [i for i, h in enumerate(found) if i in self.points or (h.unknown is None and h.log_posterior < bound)]
+        flown, kept = [k for k, i in enumerate(chosen) if i in self.points], [found[i] for i in chosen] + others
         least = min([self._least(), *(h.left for h in others)])
         bare = self._bare()
-        return replace(self.linear, hypotheses=normalised(forgive(kept, self.nothing, least, bare), 0.0), bare=bare,
-                       settled=self.points[ranked[0]].nuisances)
+        told = normalised(forgive(kept, self.nothing, least, bare, flown), 0.0)
+        return replace(self.linear, hypotheses=told, bare=bare, settled=self.points[ranked[0]].nuisances)
 
 
 def _moved(terms: Sequence[Term]) -> tuple[Term, ...]:
