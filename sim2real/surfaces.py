@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from icing_env.record import FloatArray
 from sim2real.channels import SURFACES
@@ -21,6 +22,7 @@ from sim2real.reconstruct import Reconstruction
 PLACED = 3e-5  # rad, what such a law leaves (assumed: a position's noise over the root of the samples behind a term)
 DRIFTS = 6  # cosines over a record that a law's shift may take
 SCALES = (5, 25, 100)  # samples over which what is left has to average out as white noise does
+SHORTEST, FINE = 1e-3, 1e-4  # s: least lag, and how finely it is found
 CHANCE = 4.0  # deviations of a mean square by chance that still pass for white
 
 
@@ -39,20 +41,30 @@ def placed(flight: Reconstruction) -> Reconstruction:
 
 def _law(flight: Reconstruction, command: FloatArray, surface: str) -> FloatArray | None:
     """Positions [N] before the recording's low pass, as the command makes them; None if they were not those."""
-    recorded = flight.positions[surface]
-    rows = np.repeat(flight.parameters, len(LAGS))
-    rows[f"{surface}_lag"] = np.maximum(rows[f"{surface}_lag"] + LAGS, 0.0)
-    seen = follow(command, recorded[0], rows, surface, flight.dt)
-    rows["filter_frequency"] = UNFILTERED
-    true = follow(command, recorded[0], rows, surface, flight.dt)
-    best, left = None, np.inf
-    for k in range(len(LAGS)):
-        basis = _basis(seen[:, k])
-        weights = np.linalg.lstsq(basis, recorded, rcond=None)[0]
-        rest = recorded - basis @ weights
-        if (square := float(rest @ rest)) < left:
-            best, left, remainder = _basis(true[:, k]) @ weights, square, rest
-    return best if _white(remainder) else None
+    recorded, published = flight.positions[surface], float(flight.parameters[f"{surface}_lag"][0])
+
+    def behind(lag: float, filtered: bool = True) -> FloatArray:
+        row = flight.parameters.copy()
+        row[f"{surface}_lag"] = lag
+        if not filtered:
+            row["filter_frequency"] = UNFILTERED
+        return _basis(follow(command, recorded[0], row, surface, flight.dt)[:, 0])
+
+    def left(lag: float) -> FloatArray:
+        basis = behind(lag)
+        return np.asarray(recorded - basis @ np.linalg.lstsq(basis, recorded, rcond=None)[0])
+
+    def square(lag: float) -> float:
+        return float(np.sum(left(lag) ** 2))
+
+    lags = np.unique(np.maximum(published + LAGS, SHORTEST))
+    k = int(np.argmin([square(lag) for lag in lags]))
+    near = (lags[max(k - 1, 0)], lags[min(k + 1, len(lags) - 1)])
+    lag = float(minimize_scalar(square, bounds=near, method="bounded", options={"xatol": FINE}).x)
+    if not _white(left(lag)):
+        return None
+    weights = np.linalg.lstsq(behind(lag), recorded, rcond=None)[0]
+    return np.asarray(behind(lag, filtered=False) @ weights)
 
 
 def _basis(position: FloatArray) -> FloatArray:

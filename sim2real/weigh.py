@@ -25,7 +25,7 @@ from sim2real.terms import pushes
 SETTLING, SETTLED = 4, 3.0  # steps towards the best nuisances, and the whitened length of a step that ends them
 RELINEARISE = 8.0  # whitened distance of the fitted nuisances beyond which all is flown again about them
 CALMER = 0.6  # ratio of temperings below which the leading explanations are flown again
-UNLIKE = 0.14  # log of the ratio of innovation variances beyond which another gain is worth a flight
+UNLIKE = 0.25  # log of the ratio of innovation variances beyond which another gain is worth a flight: two of SIGMAS
 FIRST_ORDER = 3.0  # least tempering where another simulator's accelerations stand in for its flight (assumed)
 FARTHEST = 4.0  # standard deviations: what is beyond is no nuisance
 Progress = Callable[[str], None]
@@ -37,54 +37,61 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
 
     Signatures are linear in the nuisances only nearby, and turbulence makes them large: derivatives that are off by
     5 % lie some 200 noise units away at sigma_w = 1.5 m/s, of which a first linear step leaves 5 to 30. Flown from
-    afar, what is left is blamed on an effect.
+    afar, what is left is blamed on an effect. Gains are those of the best explanation, too (see `explained`).
     """
     progress("fitting the model's own uncertainty")
     centre, known = settle(flights, candidates, baseline)
     progress(f"flying {candidates.size} variants along {len(flights)} records")
-    evidences = gather_about(flights, candidates, centre, known)
-    quiet = dict(untestable)
+    evidences, quiet = gather_about(flights, candidates, centre, known), dict(untestable)
     posterior = weigh(evidences, candidates, quiet, baseline, centre)
-    gram = with_prior(total(evidences) / posterior.tempering, candidates, baseline.precision, centre)
-    step = nearer(centre + nuisance_mean(gram, candidates, posterior.best.weights), candidates) - centre
-    if _length(gram, step) > RELINEARISE:
-        centre = centre + step
-        progress("flying the variants again about the fitted model")
-        evidences, quiet = gather_about(flights, candidates, centre), dict(untestable)
-        posterior = weigh(evidences, candidates, quiet, baseline, centre)
+
+    def start(known: Hypothesis) -> FloatArray:
         gram = with_prior(total(evidences) / posterior.tempering, candidates, baseline.precision, centre)
+        return centre + nuisance_mean(gram, candidates, known.weights)
+
+    def flying(tempering: float) -> Flying:
+        return Flying(flights, candidates, evidences, baseline, tempering, Courses(evidences, tempering))
+
+    def judged(best: Hypothesis, nuisances: FloatArray) -> tuple[list[Gain], bool]:
+        gains = [explained(e, f, candidates, best, nuisances) for e, f in zip(evidences, flights, strict=True)]
+        return gains, max(unlike(g, e.gain) for g, e in zip(gains, evidences, strict=True)) > UNLIKE
+
+    best, there, other, gap = posterior.best, start(posterior.best), False, bool(leading(posterior))
+    if gap:
+        if best.effects and best.unknown is None:
+            point = flying(posterior.tempering).settle(best.fit, there)
+            best, there = replace(best, fit=replace(best.fit, estimate=tuple(point.sizes))), point.nuisances
+        known, other = judged(best, there)
+    step = nearer(there, candidates) - centre
+    gram = with_prior(total(evidences) / posterior.tempering, candidates, baseline.precision, centre)
+    if other or _length(gram, step) > RELINEARISE:
+        centre, quiet = centre + step, dict(untestable)
+        progress("flying the variants again about the fitted model")
+        evidences = gather_about(flights, candidates, centre, known if gap else None)
+        posterior = weigh(evidences, candidates, quiet, baseline, centre)
     untestable |= quiet
     if leading(posterior):
         progress("flying the leading explanations where they were fitted")
-
-        def start(known: Hypothesis) -> FloatArray:
-            return centre + nuisance_mean(gram, candidates, known.weights)
-
-        def flying(tempering: float) -> Flying:
-            return Flying(flights, candidates, evidences, baseline, tempering, Courses(evidences, tempering))
-
         posterior = refine(flying(posterior.tempering), start, posterior)
-        chosen = [explained(e, f, candidates, posterior) for e, f in zip(evidences, flights, strict=True)]
-        other = max(unlike(g, e.gain) for g, e in zip(chosen, evidences, strict=True)) > UNLIKE
+        known, other = judged(posterior.best, np.asarray(posterior.settled))
         calm = temper(posterior.bare * posterior.tempering, evidences)
         if other or calm < CALMER * posterior.tempering:
             progress("flying the leading explanations again, gusts and remainder judged with them")
             if other:
-                evidences = gather_about(flights, candidates, centre, chosen)
+                evidences = gather_about(flights, candidates, centre, known)
             posterior = weigh(evidences, candidates, dict(untestable), baseline, centre, calm)
-            gram = with_prior(total(evidences) / calm, candidates, baseline.precision, centre)
             posterior = refine(flying(calm), start, posterior)
     return evidences, replace(posterior, hypotheses=normalised(posterior.hypotheses))
 
 
-def explained(evidence: Evidence, flight: Reconstruction, candidates: Bank, posterior: Posterior) -> Gain:
+def explained(evidence: Evidence, flight: Reconstruction, candidates: Bank, best: Hypothesis,
+              nuisances: FloatArray) -> Gain:
     """The gain of the best explanation, with the gust intensity that is likeliest with it in the model.
 
     Without it, what a gap makes of a record passes for gust, or for calm; and the innovations of an aircraft whose
     vanes lag by far more than published are not white in gusts: their colour would be blamed on something.
     """
-    best = posterior.best
-    row = shifted(flight.parameters, candidates.nuisances, np.asarray(posterior.settled), flight.power_from)
+    row = shifted(flight.parameters, candidates.nuisances, nuisances, flight.power_from)
     if best.effects:
         row = effects.with_effects(row, best.fit.values)
     moved, weights = replace(flight, parameters=row), best.unknown.weights if best.unknown else {}

@@ -17,6 +17,7 @@ from sim2real.form import (
     LUCK,
     SHARES,
     Form,
+    Liberty,
     forgiven,
     gain,
     own_terms,
@@ -24,6 +25,7 @@ from sim2real.form import (
 )
 from sim2real.form import given as after_terms
 from sim2real.generic import fit_unknown
+from sim2real.hypotheses import set_prior, within
 from sim2real.terms import BEYOND, GENERIC, unit_of
 
 TERMS = 6
@@ -76,11 +78,38 @@ def test_a_small_remainder_is_not_forgiven_and_a_large_one_costs_its_logarithm()
 @given(st.floats(0.0, 1e4), st.floats(0.0, 1e4))
 def test_what_no_course_at_home_could_make_is_not_forgiven(left, free):
     """A second effect elsewhere must not hide in the form of the first."""
-    form, noise, explained = Form((0.0,), (6e4 + left,), ((free, 1),)), 6e4, 1e6
+    form, noise, explained = Form((0.0,), (6e4 + left,), (Liberty(free),)), 6e4, 1e6
     got = form.regained(6e4 + left + explained, noise, noise)
     most = min(left, free + LEAK**2 * explained)
     assert got <= 0.5 * most + 1e-6
     assert form.bare() == pytest.approx(6e4 + left - free + LUCK)
+
+
+@given(st.floats(0.0, 1e4), st.floats(0.0, 1e4))
+def test_a_member_that_explains_little_is_forgiven_little(left, most):
+    """Else whatever has a home at the right place would be named beside the true effect."""
+    free = Form((0.0,), (6e4 + left,), (Liberty(np.inf, 1, most),))
+    assert free.regained(1e6, 6e4) <= 0.5 * min(left, most) + 1e-6
+
+
+def test_what_terms_take_of_noise_is_luck():
+    """Else the best explanation seems to leave less than noise, and every other one to leave too much."""
+    rng = np.random.default_rng(4)
+    columns = 10.0 * rng.standard_normal((200, TERMS)) / np.sqrt(200.0)
+    taken = []
+    for _ in range(400):
+        noise = rng.standard_normal(200)
+        whole = np.column_stack([noise, columns])
+        gram = whole.T @ whole
+        taken.append(gram[0, 0] - gain(gram[1:, 1:], gram[1:, 0], np.full(TERMS, 1e4), float(gram[0, 0])).least)
+    assert np.mean(taken) < 0.5 * TERMS  # the worst of several ways; without luck all of TERMS and more
+
+
+def test_a_guest_enters_nowhere_but_at_its_host():
+    assert within("elevator_gearing", ["elevator_lag"]) and within("ice_drag", ["wing_ice"])
+    assert not within("wing_ice", ["ice_drag"]) and not within("inertia_error", ["lateral_cg"])
+    assert within("lift_slope", ["asymmetric_ice"])  # half a wing's lift is lift
+    assert set_prior(("elevator_gearing", "elevator_lag"), 50) < set_prior(("elevator_gearing", "aileron_lag"), 50)
 
 
 def test_terms_given_their_room_take_what_the_evidence_says_they_take() -> None:
@@ -89,7 +118,7 @@ def test_terms_given_their_room_take_what_the_evidence_says_they_take() -> None:
     after = after_terms(gram, list(range(1, TERMS + 1)), square, SHARES[1])
     form = gain(gram[1:, 1:], gram[1:, 0], square, 20.0**2)
     assert 0.0 < after[0, 0] < 0.2 * gram[0, 0]
-    assert form.left[2] <= after[0, 0] + 1e-6  # the evidence's own square has its prior's share beside it
+    assert form.left[2] <= after[0, 0] + TERMS  # the evidence's own square has its prior's share beside it, luck apart
 
 
 def test_sizes_give_way_before_a_form_is_judged() -> None:

@@ -1,0 +1,64 @@
+"""A surface is where its command puts it if nothing but noise is between; else where it was recorded."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from icing_env import scenario
+from icing_env.record import FloatArray
+from sim2real.channels import SURFACE_NOISE
+from sim2real.paths import UNFILTERED, follow
+from sim2real.reconstruct import Reconstruction, reconstruct
+from sim2real.surfaces import PLACED, placed
+from testbed.flight import fly
+
+NOISE = 5.2e-4  # rad
+
+
+@pytest.fixture(scope="module")
+def flight() -> Reconstruction:
+    chosen = scenario.load("clear_air", duration=40.0, parameters={"turbulence_sigma_w": 0.0})
+    return reconstruct(fly(chosen, seed=2, observer=False, protection=False).record)
+
+
+def driven(flight: Reconstruction, lag: float, error: FloatArray | float = 0.0,
+           seed: int = 0) -> tuple[Reconstruction, FloatArray]:
+    """A record whose elevator follows doublets with a lag, and errs; and where the elevator was."""
+    t = flight.time
+    command = 0.05 * np.sign(np.sin(0.9 * t)) * (np.abs(np.sin(0.35 * t)) > 0.4)
+    row = flight.parameters.copy()
+    row["elevator_lag"] = lag
+    seen = follow(command, 0.0, row, "elevator", flight.dt)[:, 0] + error
+    row["filter_frequency"] = UNFILTERED
+    true = follow(command, 0.0, row, "elevator", flight.dt)[:, 0] + error
+    noisy = seen + NOISE * np.random.default_rng(seed).standard_normal(len(t))
+    return replace(flight, commands={"elevator_command": command}, positions=flight.positions | {"elevator": noisy},
+                   controls=flight.controls | {"elevator": noisy}), true
+
+
+@pytest.mark.parametrize("lag", [0.05, 0.09, 0.23])
+@pytest.mark.parametrize("drift", [0.0, 0.004])
+def test_a_surface_that_follows_its_command_is_placed_far_better_than_it_was_recorded(flight, lag, drift):
+    made, true = driven(flight, lag, drift * np.sin(np.linspace(0.0, 2.0, len(flight.time))))
+    found = placed(made)
+    assert found.surface_noise[0] == PLACED and list(found.surface_noise[1:]) == [SURFACE_NOISE] * 2
+    assert np.sqrt(np.mean((found.controls["elevator"] - true)[50:] ** 2)) < 0.4 * NOISE
+    assert np.array_equal(found.positions["elevator"], made.positions["elevator"])
+
+
+def test_a_surface_that_does_something_else_stays_where_it_was_recorded(flight):
+    t = flight.time
+    for error in (0.004 * (np.sin(1.7 * t) > 0.6), 0.002 * np.sin(9.0 * t)):
+        found = placed(driven(flight, 0.05, error)[0])
+        assert found.surface_noise[0] == SURFACE_NOISE
+
+
+def test_a_surface_without_a_moving_command_stays_where_it_was_recorded(flight):
+    made, _ = driven(flight, 0.05)
+    for commands in ({}, {"elevator_command": np.full(len(flight.time), 0.01)}):
+        found = placed(replace(made, commands=commands))
+        assert np.array_equal(found.controls["elevator"], made.controls["elevator"])
+        assert list(found.surface_noise) == [SURFACE_NOISE] * 3
