@@ -10,14 +10,15 @@ from scipy.special import logsumexp
 
 from icing_env import effects
 from icing_env.record import FloatArray
-from sim2real.form import ALSO, MOSTLY, OTHER_FORM, SHAPE, SHARES, Form, alike, at_home, forgiven
+from sim2real.form import MOSTLY, OTHER_FORM, SHAPE, SHARES, Form, alike, at_home, forgiven
 from sim2real.generic import UnknownFit
+from sim2real.paths import PATHS
 from sim2real.sets import SetFit
 from sim2real.singles import EffectFit
 
 # Prior (assumed): what is left is shared by single effects. A pair is about one per cent as likely as either member.
 P_NONE, P_UNKNOWN, P_PAIRS, P_TRIPLES, P_BESIDE = 0.5, 0.05, 0.07, 0.002, 0.007
-SAME_PLACE = 0.02  # of that where one member enters nowhere but where another does: another form of it is likelier
+SAME_PLACE = 0.02  # of that where two members are faults of one device: another form of one is likelier (assumed)
 KEPT = 1e-5  # sets of several effects less probable than this are dropped
 
 
@@ -190,10 +191,13 @@ def _with_guests(h: Hypothesis, larger: Sequence[Hypothesis], nothing: float) ->
 
 
 def within(name: str, others: Sequence[str]) -> bool:
-    """Whether an effect enters nowhere but where one of some others does; what mass does enters everywhere."""
-    places = set(effects.LIBRARY[name].enters_at) - {"mass"}
-    there = [{*effects.LIBRARY[other].enters_at, *ALSO.get(other, ())} for other in others]
-    return bool(places) and any(places <= at for at in there)
+    """Whether an effect enters at one device alone (an actuator, an engine, an instrument) where another one does.
+
+    Two faults of one device at once are rarer than one of another form; along an axis of the air's forces they are not.
+    """
+    places = effects.LIBRARY[name].enters_at
+    device = len(places) == 1 and (places[0].startswith("sensor:") or places[0] in PATHS)
+    return device and any(places[0] in effects.LIBRARY[other].enters_at for other in others)
 
 
 def _regained(h: Hypothesis, nothing: float, least: float, bare: float) -> float:

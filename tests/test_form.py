@@ -105,10 +105,10 @@ def test_what_terms_take_of_noise_is_luck():
     assert np.mean(taken) < 0.5 * TERMS  # the worst of several ways; without luck all of TERMS and more
 
 
-def test_a_guest_enters_nowhere_but_at_its_host():
-    assert within("elevator_gearing", ["elevator_lag"]) and within("ice_drag", ["wing_ice"])
-    assert not within("wing_ice", ["ice_drag"]) and not within("inertia_error", ["lateral_cg"])
-    assert within("lift_slope", ["asymmetric_ice"])  # half a wing's lift is lift
+def test_a_guest_is_a_fault_of_its_host_s_device():
+    assert within("elevator_gearing", ["elevator_lag"]) and within("thrust_loss", ["asymmetric_thrust"])
+    assert not within("asymmetric_thrust", ["thrust_loss"]) and not within("elevator_gearing", ["aileron_lag"])
+    assert not within("rudder_power", ["fin_ice"]) and not within("inertia_error", ["lateral_cg"])
     assert set_prior(("elevator_gearing", "elevator_lag"), 50) < set_prior(("elevator_gearing", "aileron_lag"), 50)
 
 
