@@ -19,6 +19,7 @@ from sim2real.singles import EffectFit
 # Prior (assumed): what is left is shared by single effects. A pair is about one per cent as likely as either member.
 P_NONE, P_UNKNOWN, P_PAIRS, P_TRIPLES, P_BESIDE = 0.5, 0.05, 0.07, 0.002, 0.007
 SAME_PLACE = 0.02  # of that where two members are faults of one device: another form of one is likelier (assumed)
+DOUBT = 0.02  # of the probability: that the evidence as a whole misleads (assumed; chosen on development cases)
 KEPT = 1e-5  # sets of several effects less probable than this are dropped
 
 
@@ -222,6 +223,15 @@ def normalised(found: Sequence[Hypothesis], least: float = KEPT) -> tuple[Hypoth
     total = float(share[keep].sum())
     out = [replace(found[i], probability=float(share[i]) / total) for i in keep]
     return tuple(sorted(out, key=lambda h: -h.log_posterior))
+
+
+def doubted(found: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+    """Hypotheses of which a share DOUBT of the probability goes as it did before any flight: all of it may be wrong."""
+    prior = np.array([h.log_prior for h in found])
+    before = np.exp(prior - logsumexp(prior))
+    out = [replace(h, probability=(1.0 - DOUBT) * h.probability + DOUBT * float(b))
+           for h, b in zip(found, before, strict=True)]
+    return tuple(sorted(out, key=lambda h: -h.probability))
 
 
 def leaving_out(posterior: Posterior, names: Sequence[str]) -> Posterior:

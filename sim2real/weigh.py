@@ -13,7 +13,7 @@ from sim2real.attribution import attribute, nuisance_mean, reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, shifted
 from sim2real.courses import Courses
 from sim2real.evidence import SIGMAS, Evidence, choose_gain, gather, predicted
-from sim2real.hypotheses import Hypothesis, Posterior, leaving_out, normalised
+from sim2real.hypotheses import Hypothesis, Posterior, doubted, leaving_out, normalised
 from sim2real.kalman import Gain, follow, gains
 from sim2real.points import Flying
 from sim2real.predictor import innovations
@@ -81,7 +81,7 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
                 evidences = gather_about(flights, candidates, centre, known)
             posterior = weigh(evidences, candidates, dict(untestable), baseline, centre, calm)
             posterior = refine(flying(calm), start, posterior)
-    return evidences, replace(posterior, hypotheses=normalised(posterior.hypotheses))
+    return evidences, replace(posterior, hypotheses=doubted(normalised(posterior.hypotheses)))
 
 
 def explained(evidence: Evidence, flight: Reconstruction, candidates: Bank, best: Hypothesis,
