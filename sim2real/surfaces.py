@@ -16,7 +16,7 @@ from scipy.optimize import minimize_scalar
 
 from icing_env.record import FloatArray
 from sim2real.channels import SURFACES
-from sim2real.paths import LAGS, STILL_COMMAND, UNFILTERED, follow, spread
+from sim2real.paths import LAGS, UNFILTERED, follow, spread
 from sim2real.reconstruct import Reconstruction
 
 PLACED = 3e-5  # rad, what such a law leaves (assumed: a position's noise over the root of the samples behind a term)
@@ -31,8 +31,8 @@ def placed(flight: Reconstruction) -> Reconstruction:
     controls, noise = dict(flight.controls), flight.surface_noise.copy()
     for j, surface in enumerate(SURFACES):
         command = flight.commands.get(f"{surface}_command")
-        if command is None or np.ptp(command) < STILL_COMMAND:
-            continue
+        if command is None or np.ptp(flight.positions[surface]) == 0.0:
+            continue  # not recorded, one or the other
         law = _law(flight, command, surface)
         if law is not None:
             controls[surface], noise[j] = law, PLACED

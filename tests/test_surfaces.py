@@ -56,9 +56,13 @@ def test_a_surface_that_does_something_else_stays_where_it_was_recorded(flight):
         assert found.surface_noise[0] == SURFACE_NOISE
 
 
-def test_a_surface_without_a_moving_command_stays_where_it_was_recorded(flight):
+def test_a_surface_without_a_command_stays_where_it_was_recorded_and_one_that_is_held_is_placed(flight):
     made, _ = driven(flight, 0.05)
-    for commands in ({}, {"elevator_command": np.full(len(flight.time), 0.01)}):
-        found = placed(replace(made, commands=commands))
-        assert np.array_equal(found.controls["elevator"], made.controls["elevator"])
-        assert list(found.surface_noise) == [SURFACE_NOISE] * 3
+    found = placed(replace(made, commands={}))
+    assert np.array_equal(found.controls["elevator"], made.controls["elevator"])
+    assert list(found.surface_noise) == [SURFACE_NOISE] * 3
+    still = 0.01 + NOISE * np.random.default_rng(1).standard_normal(len(flight.time))
+    held = replace(made, commands={"elevator_command": np.full(len(flight.time), 0.01)},
+                   positions=made.positions | {"elevator": still})
+    assert placed(held).surface_noise[0] == PLACED
+    assert placed(held).controls["elevator"][100:] == pytest.approx(0.01, abs=0.3 * NOISE)
