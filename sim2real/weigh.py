@@ -38,50 +38,103 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
     Signatures are linear in the nuisances only nearby, and turbulence makes them large: derivatives that are off by
     5 % lie some 200 noise units away at sigma_w = 1.5 m/s, of which a first linear step leaves 5 to 30. Flown from
     afar, what is left is blamed on an effect. Gains are those of the best explanation, too (see `explained`).
+
+    Args:
+        untestable: effects left out, with the reason; those that these records do not show are added.
     """
     progress("fitting the model's own uncertainty")
     centre, known = settle(flights, candidates, baseline)
+    found = _Weighing(flights, candidates, baseline, untestable, centre)
     progress(f"flying {candidates.size} variants along {len(flights)} records")
-    evidences, quiet = gather_about(flights, candidates, centre, known), dict(untestable)
-    posterior = weigh(evidences, candidates, quiet, baseline, centre)
-
-    def start(known: Hypothesis) -> FloatArray:
-        gram = with_prior(total(evidences) / posterior.tempering, candidates, baseline.precision, centre)
-        return centre + nuisance_mean(gram, candidates, known.weights)
-
-    def flying(tempering: float) -> Flying:
-        return Flying(flights, candidates, evidences, baseline, tempering, Courses(evidences, tempering))
-
-    def judged(best: Hypothesis, nuisances: FloatArray) -> tuple[list[Gain], bool]:
-        gains = [explained(e, f, candidates, best, nuisances) for e, f in zip(evidences, flights, strict=True)]
-        return gains, max(unlike(g, e.gain) for g, e in zip(gains, evidences, strict=True)) > UNLIKE
-
-    best, there, other, gap = posterior.best, start(posterior.best), False, bool(leading(posterior))
-    if gap:
-        if best.effects and best.unknown is None:
-            point = flying(posterior.tempering).settle(best.fit, there)
-            best, there = replace(best, fit=replace(best.fit, estimate=tuple(point.sizes))), point.nuisances
-        known, other = judged(best, there)
-    step = nearer(there, candidates) - centre
-    gram = with_prior(total(evidences) / posterior.tempering, candidates, baseline.precision, centre)
-    if other or _length(gram, step) > RELINEARISE:
-        centre, quiet = centre + step, dict(untestable)
+    found.gather(known)
+    if found.moved():
         progress("flying the variants again about the fitted model")
-        evidences = gather_about(flights, candidates, centre, known if gap else None)
-        posterior = weigh(evidences, candidates, quiet, baseline, centre)
-    untestable |= quiet
-    if leading(posterior):
+        found.gather(found.known)
+    untestable |= found.quiet
+    if leading(found.posterior):
         progress("flying the leading explanations where they were fitted")
-        posterior = refine(flying(posterior.tempering), start, posterior)
-        known, other = judged(posterior.best, np.asarray(posterior.settled))
-        calm = temper(posterior.bare * posterior.tempering, evidences)
-        if other or calm < CALMER * posterior.tempering:
+        found.refine()
+        if found.judged_anew():
             progress("flying the leading explanations again, gusts and remainder judged with them")
-            if other:
-                evidences = gather_about(flights, candidates, centre, known)
-            posterior = weigh(evidences, candidates, dict(untestable), baseline, centre, calm)
-            posterior = refine(flying(calm), start, posterior)
-    return evidences, replace(posterior, hypotheses=doubted(normalised(posterior.hypotheses)))
+            found.refine()
+    return found.evidences, replace(found.posterior, hypotheses=doubted(normalised(found.posterior.hypotheses)))
+
+
+class _Weighing:
+    """Evidence of some records about a model moved by `centre` [n] nuisances, and what it says so far.
+
+    known: gains of the best explanation, once it has been flown; quiet: effects that these records do not show.
+    """
+
+    evidences: list[Evidence]
+    posterior: Posterior
+
+    def __init__(self, flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline,
+                 untestable: dict[str, str], centre: FloatArray) -> None:
+        self.flights, self.candidates, self.baseline = flights, candidates, baseline
+        self.untestable, self.centre = untestable, centre
+        self.known: list[Gain] | None = None
+        self.quiet = dict(untestable)
+
+    def gather(self, known: Sequence[Gain] | None) -> None:
+        """Fly the variants about the centre, with gains where known, and weigh what they say."""
+        self.evidences = gather_about(self.flights, self.candidates, self.centre, known)
+        self._weigh(None)
+
+    def _weigh(self, tempering: float | None) -> None:
+        self.quiet = dict(self.untestable)
+        self.posterior = weigh(self.evidences, self.candidates, self.quiet, self.baseline, self.centre, tempering)
+
+    def _gram(self) -> FloatArray:
+        """Inner products of all records, tempered, the nuisances' prior among them."""
+        return with_prior(total(self.evidences) / self.posterior.tempering, self.candidates, self.baseline.precision,
+                          self.centre)  # fmt: skip
+
+    def start(self, known: Hypothesis) -> FloatArray:
+        """Best nuisances [n] of an explanation, as far as the linear fit knows."""
+        return self.centre + nuisance_mean(self._gram(), self.candidates, known.weights)
+
+    def _flying(self) -> Flying:
+        t = self.posterior.tempering
+        return Flying(self.flights, self.candidates, self.evidences, self.baseline, t, Courses(self.evidences, t))
+
+    def moved(self) -> bool:
+        """Move the centre to where the likeliest explanation has it, if that or its gains are far from what was flown.
+
+        A known set is fitted where it lies; beside something unknown the linear fit has to do.
+        """
+        best, there, other = self.posterior.best, self.start(self.posterior.best), False
+        if leading(self.posterior):
+            if best.effects and best.unknown is None:
+                point = self._flying().settle(best.fit, there)
+                best, there = replace(best, fit=replace(best.fit, estimate=tuple(point.sizes))), point.nuisances
+            other = self._judged(best, there)
+        step = nearer(there, self.candidates) - self.centre
+        if not other and _length(self._gram(), step) <= RELINEARISE:
+            return False
+        self.centre = self.centre + step
+        return True
+
+    def _judged(self, best: Hypothesis, nuisances: FloatArray) -> bool:
+        """Find the gains with an explanation in the model; whether they are worth a flight."""
+        self.known = [explained(e, f, self.candidates, best, nuisances)
+                      for e, f in zip(self.evidences, self.flights, strict=True)]  # fmt: skip
+        return max(unlike(g, e.gain) for g, e in zip(self.known, self.evidences, strict=True)) > UNLIKE
+
+    def refine(self) -> None:
+        """Fly the leading explanations where they lie."""
+        self.posterior = refine(self._flying(), self.start, self.posterior)
+
+    def judged_anew(self) -> bool:
+        """Weigh anew with the gains and the tempering of the best explanation flown, where these are others."""
+        other = self._judged(self.posterior.best, np.asarray(self.posterior.settled))
+        calm = temper(self.posterior.bare * self.posterior.tempering, self.evidences)
+        if not other and calm >= CALMER * self.posterior.tempering:
+            return False
+        if other:
+            self.evidences = gather_about(self.flights, self.candidates, self.centre, self.known)
+        self._weigh(calm)
+        return True
 
 
 def explained(evidence: Evidence, flight: Reconstruction, candidates: Bank, best: Hypothesis,

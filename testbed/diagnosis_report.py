@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 
 from icing_env.record import FloatArray
 from sim2real import gap
-from sim2real.channels import TOLERANCE
+from sim2real.channels import MEASURED, TOLERANCE
 from sim2real.diagnosis import Diagnosis
 from sim2real.paths import driven
+from sim2real.where import Stretch, stretches
 from sim2real.windows import COMPARED, cut, residuals
 from sim2real.words import sentences
 from testbed.commands.common import plain
@@ -96,9 +97,12 @@ def _where(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:
         report.table(["component", "probability that the gap enters there"],
                      [[c, p] for c, p in result["where"]["components"].items()], "Where the gap enters.")
     report.figure(_heat(training), "Residual by channel and window, in tolerances, before the diagnosis.")
+    report.figure(_regime_heat(stretches(found.details.evidences)),
+                  "One-step predictions by channel and flight regime (quarters of each variable, low to high): root "
+                  "mean square error over what noise and gusts make. Dots: beyond chance (false discoveries 5 %).")
     if result["where"]["regimes"]:
-        report.table(["variable", "from", "to", "excess"],
-                     [[scale_of(r["variable"]).label, r["low"], r["high"], r["excess"]]
+        report.table(["variable", "from", "to", "excess", "channels"],
+                     [[scale_of(r["variable"]).label, r["low"], r["high"], r["excess"], ", ".join(r["channels"]) or "-"]
                       for r in result["where"]["regimes"][:10]],
                      "Regimes in which one-step predictions err by more than noise and gusts (mean square less one).")
 
@@ -204,4 +208,26 @@ def _heat(energy: gap.Energy) -> Figure:
     axes.set_xlabel("window (10 s each)")
     axes.grid(False)
     figure.colorbar(image, ax=axes, label="tolerances")
+    return figure
+
+
+def _regime_heat(found: list[Stretch]) -> Figure:
+    """Channels by quarters of each variable; a dot where the error is beyond chance."""
+    shown = [c for c in range(len(MEASURED)) if any(np.isfinite(s.excess[c]) for s in found)]
+    values = np.sqrt(np.maximum(np.array([s.excess[shown] for s in found]).T + 1.0, 0.0))
+    figure = Figure(figsize=(9.2, 1.2 + 0.3 * len(shown)), layout="constrained")
+    axes = figure.subplots()
+    image = axes.imshow(values, aspect="auto", cmap="viridis", vmin=0.8, vmax=max(2.0, float(np.nanmax(values))))
+    at, row = np.nonzero(np.array([s.shown[shown] for s in found]))
+    axes.plot(at, row, "o", color="white", markeredgecolor="black", markersize=4)
+    names = list(dict.fromkeys(s.variable for s in found))
+    first = [next(i for i, s in enumerate(found) if s.variable == name) for name in names]
+    last = [*first[1:], len(found)]
+    axes.set_xticks([0.5 * (a + b - 1) for a, b in zip(first, last, strict=True)],
+                    [scale_of(name).label for name in names], rotation=30, ha="right")  # fmt: skip
+    for edge in first[1:]:
+        axes.axvline(edge - 0.5, color="white", linewidth=2.0)
+    axes.set_yticks(range(len(shown)), [scale_of(MEASURED[c]).label for c in shown])
+    axes.grid(False)
+    figure.colorbar(image, ax=axes, label="error over noise and gusts")
     return figure

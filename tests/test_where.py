@@ -9,6 +9,7 @@ import pytest
 
 from icing_env import scenario
 from sim2real.candidates import bank
+from sim2real.channels import MEASURED
 from sim2real.evidence import Evidence, gather
 from sim2real.reconstruct import reconstruct
 from sim2real.where import REGIME_VARIABLES, regimes
@@ -43,3 +44,11 @@ def test_energy_in_one_stretch_is_named_there(evidence, variable):
     found = [r for r in regimes([replace(evidence, whitened=noise)]) if r["variable"] == variable]
     assert found and found[0]["high"] == pytest.approx(max(values), abs=0.5 * np.ptp(values))
     assert found[0]["excess"] > 0.5
+
+
+def test_a_channel_is_named_where_it_alone_errs(evidence):
+    noise, values = white(evidence, 9), evidence.flight.channel("alpha")[1:]
+    noise[values > np.quantile(values, 0.75), MEASURED.index("az")] *= 2.0
+    found = [r for r in regimes([replace(evidence, whitened=noise)]) if r["variable"] == "alpha" and r["channels"]]
+    assert [set(r["channels"]) for r in found] == [{"az"}]
+    assert found[0]["channels"]["az"] == pytest.approx(3.0, abs=1.0)
