@@ -40,21 +40,23 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
     """For every path with a recorded command: (measured - predicted)/noise [N, rows], and which rows of `parameters`.
 
     Rows that differ from the first in nothing that the path knows are left out; generic terms add to its prediction.
+    Zero where the position was not recorded.
     """
     out = []
     for surface in SURFACES:
         name = f"{surface}_command"
         if name in flight.commands and np.ptp(flight.commands[name]) > STILL_COMMAND:
             rows = _differing(parameters, [f"{surface}_{quantity}" for quantity in ACTUATOR])
-            measured = flight.positions[surface]
-            predicted = follow(flight.commands[name], measured[0], parameters[rows], surface, flight.dt)
+            measured, good = flight.positions[surface], np.isfinite(flight.positions[surface])
+            whole = np.interp(flight.time, flight.time[good], measured[good])
+            predicted = follow(flight.commands[name], measured[good][0], parameters[rows], surface, flight.dt)
             own = [term for term in terms if term.component == name.replace("command", "path")]
             added = [predicted[:, 0] + path_course(flight, predicted[:, 0], term.name) for term in own]
             # of the record alone: what noise is believed must not depend on the row that stands first
-            noise = np.hypot(max(POSITION_NOISE, spread(measured)), TIMING * np.gradient(measured, flight.dt))
+            noise = np.hypot(max(POSITION_NOISE, spread(measured)), TIMING * np.gradient(whole, flight.dt))
             noise *= _weight(flight)
-            out.append(((measured[:, None] - np.column_stack([predicted, *added])) / noise[:, None],
-                        rows + [term.row for term in own]))
+            left = (measured[:, None] - np.column_stack([predicted, *added])) / noise[:, None]
+            out.append((np.where(good[:, None], left, 0.0), rows + [term.row for term in own]))
     return out + _engine_residuals(flight, parameters)
 
 
@@ -214,4 +216,6 @@ def _without_line(left: FloatArray, lever: FloatArray) -> FloatArray:
 
 def spread(values: FloatArray) -> float:
     """Noise of a smooth series, from its third differences (their variance is 20 times that of white noise)."""
-    return 1.4826 * float(np.median(np.abs(np.diff(values, 3)))) / np.sqrt(20.0)
+    third = np.diff(values, 3)
+    third = third[np.isfinite(third)]
+    return 1.4826 * float(np.median(np.abs(third))) / np.sqrt(20.0) if len(third) else 0.0

@@ -36,7 +36,7 @@ class Reconstruction:
         measured: [N, channels of MEASURED], nan where not sampled.
         controls: positions of SURFACES and flap [rad], powers left and right [W], by name, each (N,); the recording's
             low pass is undone, since the simulated instruments apply it again.
-        positions: the surfaces as recorded.
+        positions: the surfaces as recorded, nan where they were not.
         commands: surface commands [rad] and levers by name where recorded.
         parameters: one PARAMETERS row with the mass, inertia and air of this record.
         altitude: m, each sample (constant where not recorded).
@@ -107,8 +107,10 @@ def reconstruct(record: FlightRecord, base: NDArray | None = None) -> Reconstruc
     row = _airframe(record, aircraft.load() if base is None else base.copy(), values, notes)
     altitude = _air(row, values, notes)
     row["wind_reference_altitude"] = float(np.median(altitude))  # a steady wind shows nowhere; only its change does
-    positions = {n: values[n] if n in values else np.zeros(len(time)) for n in SURFACES}
-    controls = {n: unfiltered(v, float(row["filter_frequency"][0]), dt) for n, v in positions.items()}
+    moved = {n: values[n] if n in values else np.zeros(len(time)) for n in SURFACES}
+    controls = {n: unfiltered(v, float(row["filter_frequency"][0]), dt) for n, v in moved.items()}
+    at = grid.time[::every]
+    positions = {n: np.where(_sampled(record, n, at, dt), v, np.nan) if n in values else v for n, v in moved.items()}
     controls["flap"] = values.get("flap", np.zeros(len(time)))
     notes.extend(f"{n} not recorded: taken as zero" for n in SURFACES if n not in values)
     source, powers = _powers(row, values, altitude, notes)
@@ -137,13 +139,17 @@ def _measured(record: FlightRecord, time: FloatArray, values: dict[str, FloatArr
     for j, name in enumerate(MEASURED):
         if name not in values:
             continue
-        valid = np.isfinite(record[name]) if name in record.channels else np.zeros(len(record), bool)
-        at = record.time[valid]
-        near = np.zeros(len(time), dtype=bool)
-        index = np.clip(np.searchsorted(time, at - 0.5 * dt), 0, len(time) - 1)
-        near[index] = True
+        near = _sampled(record, name, time, dt)
         out[near, j] = values[name][near]
     return out
+
+
+def _sampled(record: FlightRecord, name: str, time: FloatArray, dt: float) -> NDArray[np.bool_]:
+    """Which steps have a sample of a channel near [N]."""
+    valid = np.isfinite(record[name]) if name in record.channels else np.zeros(len(record), bool)
+    near = np.zeros(len(time), dtype=bool)
+    near[np.clip(np.searchsorted(time, record.time[valid] - 0.5 * dt), 0, len(time) - 1)] = True
+    return near
 
 
 def _airframe(record: FlightRecord, row: NDArray, values: dict[str, FloatArray], notes: list[str]) -> NDArray:

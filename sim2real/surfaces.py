@@ -2,8 +2,8 @@
 
 Noise of a position drives the model as if the surface shook, and the predictor then forgets what a steady moment does.
 Commands are exact. Where a smooth law from the command (its actuator at the best lag, geared, shifted, bent, drifting)
-leaves nothing of the recorded position but white noise, the surface was where that law has it; else where it was
-recorded, noise and all.
+leaves nothing of the recorded position but white noise, the surface was where that law has it, where the position was
+not recorded too; else where it was recorded, noise and all.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ def placed(flight: Reconstruction) -> Reconstruction:
     controls, noise = dict(flight.controls), flight.surface_noise.copy()
     for j, surface in enumerate(SURFACES):
         command = flight.commands.get(f"{surface}_command")
-        if command is None or np.ptp(flight.positions[surface]) == 0.0:
+        recorded = flight.positions[surface]
+        if command is None or np.nanmax(recorded) == np.nanmin(recorded):
             continue  # not recorded, one or the other
         law = _law(flight, command, surface)
         if law is not None:
@@ -41,7 +42,8 @@ def placed(flight: Reconstruction) -> Reconstruction:
 
 def _law(flight: Reconstruction, command: FloatArray, surface: str) -> FloatArray | None:
     """Positions [N] before the recording's low pass, as the command makes them; None if they were not those."""
-    recorded, published = flight.positions[surface], float(flight.parameters[f"{surface}_lag"][0])
+    good, published = np.isfinite(flight.positions[surface]), float(flight.parameters[f"{surface}_lag"][0])
+    recorded = flight.positions[surface][good]
 
     def behind(lag: float, filtered: bool = True) -> FloatArray:
         row = flight.parameters.copy()
@@ -51,7 +53,7 @@ def _law(flight: Reconstruction, command: FloatArray, surface: str) -> FloatArra
         return _basis(follow(command, recorded[0], row, surface, flight.dt)[:, 0])
 
     def left(lag: float) -> FloatArray:
-        basis = behind(lag)
+        basis = behind(lag)[good]
         return np.asarray(recorded - basis @ np.linalg.lstsq(basis, recorded, rcond=None)[0])
 
     def square(lag: float) -> float:
@@ -63,7 +65,7 @@ def _law(flight: Reconstruction, command: FloatArray, surface: str) -> FloatArra
     lag = float(minimize_scalar(square, bounds=near, method="bounded", options={"xatol": FINE}).x)
     if not _white(left(lag)):
         return None
-    weights = np.linalg.lstsq(behind(lag), recorded, rcond=None)[0]
+    weights = np.linalg.lstsq(behind(lag)[good], recorded, rcond=None)[0]
     return np.asarray(behind(lag, filtered=False) @ weights)
 
 

@@ -66,3 +66,13 @@ def test_a_surface_without_a_command_stays_where_it_was_recorded_and_one_that_is
                    positions=made.positions | {"elevator": still})
     assert placed(held).surface_noise[0] == PLACED
     assert placed(held).controls["elevator"][100:] == pytest.approx(0.01, abs=0.3 * NOISE)
+
+
+def test_stretches_that_were_not_recorded_are_bridged_by_the_command(flight):
+    made, true = driven(flight, 0.09)
+    blank = made.positions["elevator"].copy()
+    blank[400:900] = np.nan
+    blank[np.arange(len(blank)) % 5 != 0] = np.nan
+    found = placed(replace(made, positions=made.positions | {"elevator": blank}))
+    assert found.surface_noise[0] == PLACED
+    assert np.sqrt(np.mean((found.controls["elevator"] - true)[50:] ** 2)) < 0.6 * NOISE
