@@ -60,9 +60,14 @@ def beside(reduced: FloatArray, bank: Bank, fit: SetFit, slopes: list[dict[int, 
 
 def _by_timing(terms: Sequence[Term], T: FloatArray, t: FloatArray) -> float:
     """Log evidence that a channel slightly out of step would have: it needs nothing unknown."""
-    gained = [0.5 * IN_STEP**2 * t[i] ** 2 / (1.0 + IN_STEP**2 * T[i, i]) - 0.5 * np.log1p(IN_STEP**2 * T[i, i])
-              for i, term in enumerate(terms) if term.name == f"{term.target}_dot"]  # fmt: skip
-    return float(max([0.0, *gained]))
+    lags = [i for i, term in enumerate(terms) if term.name == f"{term.target}_dot"]
+    return float(max([0.0, *_each_alone(T, t, IN_STEP)[lags]]))
+
+
+def _each_alone(T: FloatArray, t: FloatArray, scale: float) -> FloatArray:
+    """Log evidence of every term by itself [terms]."""
+    known = scale**2 * np.diag(T)
+    return np.asarray(0.5 * (scale * t) ** 2 / (1.0 + known) - 0.5 * np.log1p(known))
 
 
 def fit_unknown(reduced: FloatArray, bank: Bank) -> list[UnknownFit]:
@@ -79,8 +84,7 @@ def fit_unknown(reduced: FloatArray, bank: Bank) -> list[UnknownFit]:
         if np.max(np.diag(T)) <= 0.0:
             continue
         joint = [_joint(T, t, scale) for scale in SCALES]
-        alone = np.array([0.5 * (s * t) ** 2 / (1.0 + s * s * np.diag(T)) - 0.5 * np.log1p(s * s * np.diag(T))
-                          for s in SCALES])  # fmt: skip
+        alone = np.array([_each_alone(T, t, scale) for scale in SCALES])
         together = float(logsumexp([log for log, _, _ in joint])) - np.log(2 * len(SCALES))
         single = float(logsumexp(alone)) - np.log(2 * alone.size)
         if single > together:

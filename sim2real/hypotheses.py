@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import logsumexp, softmax
 
 from icing_env import effects
 from icing_env.record import FloatArray
@@ -227,8 +227,7 @@ def normalised(found: Sequence[Hypothesis], least: float = KEPT) -> tuple[Hypoth
 
 def doubted(found: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
     """Hypotheses of which a share DOUBT of the probability goes as it did before any flight: all of it may be wrong."""
-    prior = np.array([h.log_prior for h in found])
-    before = np.exp(prior - logsumexp(prior))
+    before = softmax([h.log_prior for h in found])
     out = [replace(h, probability=(1.0 - DOUBT) * h.probability + DOUBT * float(b))
            for h, b in zip(found, before, strict=True)]
     return tuple(sorted(out, key=lambda h: -h.probability))

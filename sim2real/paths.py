@@ -48,6 +48,8 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
         if name in flight.commands and np.ptp(flight.commands[name]) > STILL_COMMAND:
             rows = _differing(parameters, [f"{surface}_{quantity}" for quantity in ACTUATOR])
             measured, good = flight.positions[surface], np.isfinite(flight.positions[surface])
+            if not good.any():
+                continue
             whole = np.interp(flight.time, flight.time[good], measured[good])
             predicted = follow(flight.commands[name], measured[good][0], parameters[rows], surface, flight.dt)
             own = [term for term in terms if term.component == name.replace("command", "path")]

@@ -31,8 +31,8 @@ def placed(flight: Reconstruction) -> Reconstruction:
     controls, noise = dict(flight.controls), flight.surface_noise.copy()
     for j, surface in enumerate(SURFACES):
         command = flight.commands.get(f"{surface}_command")
-        recorded = flight.positions[surface]
-        if command is None or np.nanmax(recorded) == np.nanmin(recorded):
+        recorded = flight.positions[surface][np.isfinite(flight.positions[surface])]
+        if command is None or not np.any(recorded != recorded[:1]):
             continue  # not recorded, one or the other
         law = _law(flight, command, surface)
         if law is not None:
@@ -81,7 +81,8 @@ def _white(left: NDArray) -> bool:
     """Whether means over SCALES of samples are as small as the means of white noise."""
     square = max(spread(left), 1e-9) ** 2
     for m in SCALES:
-        count = len(left) // m
+        if (count := len(left) // m) == 0:
+            continue  # a short record
         means = left[: count * m].reshape(count, m).mean(axis=1)
         if np.mean(means**2) * m > square * (1.0 + CHANCE * np.sqrt(2.0 / count)):
             return False

@@ -19,8 +19,8 @@ from sim2real.reconstruct import Reconstruction
 REGIME_VARIABLES = ("alpha", "airspeed", "beta", "q", "p", "elevator", "aileron", "rudder", "power", "time")
 BINS = 4
 FEWEST = 100  # samples that make a stretch
-# Above noise, of the whitened square: what clean flights of aircraft within the model's uncertainty leave in a stretch,
-# in one channel and in all together (assumed; 0.9 and 0.2 were the most in five such flights in ten).
+# Above noise, of the whitened square: what clean flights of aircraft within the model's uncertainty may leave in a
+# stretch, in one channel and in all together (assumed; the most seen in five development flights: 0.87 and 0.16).
 LEVEL, LEVEL_OVERALL = 1.0, 0.25
 FALSE = 0.05  # of what is listed, that is expected to be there by chance
 

@@ -97,9 +97,11 @@ def _where(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:
         report.table(["component", "probability that the gap enters there"],
                      [[c, p] for c, p in result["where"]["components"].items()], "Where the gap enters.")
     report.figure(_heat(training), "Residual by channel and window, in tolerances, before the diagnosis.")
-    report.figure(_regime_heat(stretches(found.details.evidences)),
-                  "One-step predictions by channel and flight regime (quarters of each variable, low to high): root "
-                  "mean square error over what noise and gusts make. Dots: beyond chance (false discoveries 5 %).")
+    if flown := stretches(found.details.evidences):
+        report.figure(_regime_heat(flown),
+                      "One-step predictions by channel and flight regime (quarters of each variable, low to high): "
+                      "root mean square error over what noise and gusts make. Dots: beyond chance (false discoveries "
+                      "5 %).")
     if result["where"]["regimes"]:
         report.table(["variable", "from", "to", "excess", "channels"],
                      [[scale_of(r["variable"]).label, r["low"], r["high"], r["excess"], ", ".join(r["channels"]) or "-"]

@@ -10,7 +10,7 @@ import pytest
 from icing_env import scenario
 from icing_env.record import FloatArray
 from sim2real.channels import SURFACE_NOISE
-from sim2real.paths import UNFILTERED, follow
+from sim2real.paths import UNFILTERED, follow, path_residuals
 from sim2real.reconstruct import Reconstruction, reconstruct
 from sim2real.surfaces import PLACED, placed
 from testbed.flight import fly
@@ -76,3 +76,14 @@ def test_stretches_that_were_not_recorded_are_bridged_by_the_command(flight):
     found = placed(replace(made, positions=made.positions | {"elevator": blank}))
     assert found.surface_noise[0] == PLACED
     assert np.sqrt(np.mean((found.controls["elevator"] - true)[50:] ** 2)) < 0.6 * NOISE
+
+
+def test_a_short_record_and_a_blank_position_are_no_trouble(flight):
+    made, _ = driven(flight, 0.05)
+    n = 60
+    short = replace(made, time=made.time[:n], commands={k: v[:n] for k, v in made.commands.items()},
+                    positions={k: v[:n] for k, v in made.positions.items()})
+    assert len(placed(short).controls["elevator"]) in (n, len(made.time))
+    blank = replace(made, positions=made.positions | {"elevator": np.full(len(made.time), np.nan)})
+    assert placed(blank).surface_noise[0] == SURFACE_NOISE
+    assert all(np.isfinite(left).all() for left, _ in path_residuals(blank, blank.parameters))

@@ -12,7 +12,7 @@ from sim2real.candidates import bank
 from sim2real.channels import MEASURED
 from sim2real.evidence import Evidence, gather
 from sim2real.reconstruct import reconstruct
-from sim2real.where import REGIME_VARIABLES, regimes
+from sim2real.where import REGIME_VARIABLES, regimes, stretches
 from testbed.flight import fly
 
 
@@ -52,3 +52,8 @@ def test_a_channel_is_named_where_it_alone_errs(evidence):
     found = [r for r in regimes([replace(evidence, whitened=noise)]) if r["variable"] == "alpha" and r["channels"]]
     assert [set(r["channels"]) for r in found] == [{"az"}]
     assert found[0]["channels"]["az"] == pytest.approx(3.0, abs=1.0)
+
+
+def test_too_short_a_record_has_no_stretches(evidence):
+    short = replace(evidence, whitened=white(evidence, 1)[:300])
+    assert regimes([short]) == [] == stretches([short])
