@@ -27,6 +27,7 @@ from sim2real.references import Baseline, fit_baseline
 from sim2real.remedy import Remedy, leading, remedy, resimulation, values_of
 from sim2real.rollout import Rollout, difference, flying_as
 from sim2real.surfaces import placed
+from sim2real.terms import in_common
 from sim2real.weigh import Progress, fit
 from sim2real.where import components, regimes
 
@@ -148,7 +149,7 @@ def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, s
                    ) -> list[Reconstruction]:  # fmt: skip
     """Records over the model that references corrected, or over a simulator of the user's so corrected."""
     flights = [reconstruct(record, None if baseline is None else baseline.near(record)) for record in records]
-    flights = [placed(flight) for flight in in_step(flights)]
+    flights = in_common([placed(flight) for flight in in_step(flights)])
     if simulator is None:
         return flights
     return [replace(flight, known=flying_as(reconstruct(record), simulator).known)

@@ -9,7 +9,7 @@ would count as shown.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,7 +27,7 @@ from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.sets import SetFit
 from sim2real.singles import DETECTABLE
-from sim2real.terms import DEVIATION, GENERIC, GENERIC_SIZE, unit_of
+from sim2real.terms import DEVIATION, FROM_ZERO, GENERIC, GENERIC_SIZE, unit_of
 from sim2real.weigh import nearer
 
 SHOWN = DETECTABLE  # standard errors that a term has to stand out
@@ -37,7 +37,6 @@ LATE = ("_dot", "acceleration", "slow_phi", "slow_theta", "slow_ax", "slow_ay") 
 SCALE, DELAY = 0.1, 0.1  # unit of a channel's scale error, and s of its delay
 COEFFICIENT = {"x_force": "CX", "y_force": "CY", "z_force": "CZ", "rolling_moment": "Cl", "pitching_moment": "Cm",
                "yawing_moment": "Cn"}  # fmt: skip
-FROM_ZERO = ("alpha", "beta", "p", "q", "r")  # channels whose scale error is of the reading itself
 ABOUT = ("alpha", "elevator", "airspeed")  # quantities whose deviations from the records' medians are terms
 
 
@@ -142,7 +141,7 @@ def describe_unknown(flights: Sequence[Reconstruction], candidates: Bank, eviden
     flyable = {name for where, _, names in GENERIC if where == component for name in names}
     surest = max(hypothesis.unknown.terms, key=lambda term: abs(term[1]) / term[2])
     if surest[0] not in flyable:
-        return _told(component, hypothesis.unknown.terms)
+        return _told(component, hypothesis.unknown.terms, flights[0].reach)
     terms, at = choices(component, flights), condition(component, flights)
     kept, only = _others(component, candidates)
     precision = baseline.precision[np.ix_(kept, kept)]
@@ -169,11 +168,11 @@ def describe_unknown(flights: Sequence[Reconstruction], candidates: Bank, eviden
     return _written(component, terms, at, x + step, chosen, covariance)
 
 
-def _told(component: str, terms: Sequence[tuple[str, float, float]]) -> Description:
+def _told(component: str, terms: Sequence[tuple[str, float, float]], reach: Mapping[str, float]) -> Description:
     """Terms that the effect cannot fly, as the evidence has them: those that stand out, the surest first."""
     order = sorted(terms, key=lambda term: -abs(term[1]) / term[2])
     kept = [term for term in order if abs(term[1]) > SHOWN * term[2]] or order[:1]
-    units = [unit_of(name, component) for name, _, _ in kept]
+    units = [unit_of(name, component, reach) for name, _, _ in kept]
     told = tuple((name, size * unit, error * unit) for (name, size, error), unit in zip(kept, units, strict=True))
     return Description(component, told, {}, np.diag([error**2 for _, _, error in told]))
 

@@ -46,6 +46,8 @@ class Reconstruction:
         known: accelerations (m/s2 along x, y, z, rad/s2 about them) that the model is given beside its own [N, 6]: what
             another simulator has and ours has not (`sim2real.rollout`).
         surface_noise: standard deviation of the SURFACES in `controls` [3], rad, sample by sample.
+        about: the condition, by quantity, that generic terms count deviations from; the record's medians if left out.
+        reach: root mean square of the generic terms' time courses, by name, where above one.
     """
 
     name: str
@@ -63,6 +65,8 @@ class Reconstruction:
     notes: tuple[str, ...]
     known: FloatArray | None = None
     surface_noise: FloatArray = field(default_factory=lambda: np.full(len(SURFACES), SURFACE_NOISE))
+    about: dict[str, float] = field(default_factory=dict)
+    reach: dict[str, float] = field(default_factory=dict)
 
     def channel(self, name: str) -> FloatArray:
         """One column of `measured`, gaps filled by interpolation; zeros where it was not recorded."""

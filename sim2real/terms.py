@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -45,11 +45,12 @@ BEYOND: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("x_force", "u", ("beta*beta", "rudder*rudder")),
     ("z_force", "w", ("beta*beta", "alpha*alpha*alpha")),
     ("pitching_moment", "q", ("beta*beta", "alpha*alpha*alpha", "elevator*elevator*elevator", "aileron", "p", "r",
-                              "power")),
-    ("y_force", "v", ("aileron", "alpha*p", "alpha*rudder", "beta*beta*beta")),
-    ("rolling_moment", "p", ("alpha", "q", "alpha*p", "aileron*aileron*aileron", "beta*beta*beta", "power")),
+                              "q*q*q", "CT", "alpha*CT")),
+    ("y_force", "v", ("aileron", "alpha*p", "alpha*rudder", "beta*beta*beta", "airspeed")),
+    ("rolling_moment", "p", ("alpha", "q", "alpha*p", "aileron*aileron*aileron", "beta*beta*beta",
+                              "p*p*p", "airspeed", "CT")),
     ("yawing_moment", "r", ("alpha", "q", "alpha*p", "alpha*aileron", "alpha*rudder", "beta*beta*beta",
-                            "rudder*rudder*rudder", "power")),
+                            "rudder*rudder*rudder", "r*r*r", "airspeed", "CT", "alpha*CT", "beta*CT")),
     ("sensor:airspeed", "airspeed", ("alpha", "beta", "airspeed*airspeed")),
     ("sensor:alpha", "alpha", ("airspeed", "q", "alpha*alpha")), ("sensor:beta", "beta", ("alpha", "p", "r")),
     ("sensor:p", "p", ("q", "r", "az")), ("sensor:q", "q", ("p", "r", "az")), ("sensor:r", "r", ("p", "q", "az")),
@@ -68,8 +69,9 @@ PATH_SIZE = {"1": 0.5 * math.pi / 180.0, "position": 0.1, "acceleration": 0.0025
              "position*position*position": 0.1, "direction": 0.25 * math.pi / 180.0}  # rad, 1, s2, s2, 1, rad (assumed)
 THRUST_SIZE = 0.1  # (assumed)
 DEVIATION = {"alpha": 0.05, "beta": 0.05, "q": 0.1, "p": 0.2, "r": 0.1, "elevator": 0.04, "aileron": 0.08,
-             "rudder": 0.05, "airspeed": 5.0, "power": 0.2, "phi": 0.2, "theta": 0.1, "ax": 1.0, "ay": 1.0, "az": 2.0,
+             "rudder": 0.05, "airspeed": 5.0, "CT": 0.015, "phi": 0.2, "theta": 0.1, "ax": 1.0, "ay": 1.0, "az": 2.0,
              "p_dot": 1.0, "q_dot": 0.5, "r_dot": 0.3}  # fmt: skip  # what counts as one unit of a regressor (assumed)
+FROM_ZERO = ("alpha", "beta", "p", "q", "r")  # channels whose scale counts from zero
 SECOND_ORDER = 0.1  # s, by which an actuator of second order smooths what it lacks in acceleration (assumed)
 ERECTION = 30.0  # s in which a vertical gyro follows a false vertical (assumed)
 KNOT, KNOT_AT = 1.0, "at:"  # s between the knots of a free course of time (assumed: manoeuvres are slower)
@@ -85,7 +87,7 @@ def pushes(flight: Reconstruction, terms: Sequence[Term]) -> tuple[Push, ...]:
         elif term.component.startswith("sensor:"):
             out.append(Push(term.row, term.target, _sensor_course(flight, term.name, term.target), True))
         elif not term.target.endswith("_path"):
-            series = GENERIC_SIZE[term.target] * scale[term.target] * _course(flight, term.name)
+            series = GENERIC_SIZE[term.target] * scale[term.target] * _course(flight, term.name, True)
             out.append(Push(term.row, term.target, series, False))
     return tuple(out)
 
@@ -131,8 +133,28 @@ def path_course(flight: Reconstruction, position: FloatArray, name: str) -> Floa
     return PATH_SIZE[name] * course[name] if name in course else PATH_SIZE["1"] * _course(flight, name)
 
 
-def _course(flight: Reconstruction, name: str) -> FloatArray:
-    """Product of the deviations named, in units of DEVIATION; a ramp from -1 to 1 for time, or a hat about a knot."""
+def in_common(flights: Sequence[Reconstruction]) -> list[Reconstruction]:
+    """Records whose terms count deviations from one condition: the median of all of them.
+
+    A moment that is a function of the angle of attack is one function, whatever angle a record was trimmed at. A cube
+    that is far from the median in some record would be flown much larger there than anything is: no course is larger
+    than one by its root mean square.
+    """
+    if not flights:
+        return []
+    about = {factor: float(np.median(np.concatenate([_values(f, factor) for f in flights]))) for factor in DEVIATION}
+    found = [replace(f, about=about, reach={}) for f in flights]
+    names = {name for _, _, names in (*GENERIC, *BEYOND) for name in names if set(name.split("*")) <= set(DEVIATION)}
+    square = {name: np.mean(np.concatenate([_course(f, name, True) for f in found]) ** 2) for name in names}
+    return [replace(f, reach={name: max(float(np.sqrt(s)), 1.0) for name, s in square.items()}) for f in found]
+
+
+def _course(flight: Reconstruction, name: str, aerodynamic: bool = False) -> FloatArray:
+    """Product of the deviations named, in units of DEVIATION; a ramp from -1 to 1 for time, or a hat about a knot.
+
+    Args:
+        aerodynamic: what the air does with a rate of turn goes with the rate over the airspeed.
+    """
     n = len(flight.time)
     if name == "1":
         return np.ones(n)
@@ -144,15 +166,19 @@ def _course(flight: Reconstruction, name: str) -> FloatArray:
     out = np.ones(n)
     for factor in name.split("*"):
         values = _values(flight, factor)
-        out = out * (values - np.median(values)) / DEVIATION[factor]
-    return out
+        away = (values - flight.about.get(factor, float(np.median(values)))) / DEVIATION[factor]
+        if aerodynamic and factor in ("p", "q", "r"):
+            speed = flight.channel("airspeed")
+            away = away * flight.about.get("airspeed", float(np.median(speed))) / speed
+        out = out * away
+    return out / flight.reach.get(name, 1.0)
 
 
 def _values(flight: Reconstruction, factor: str) -> FloatArray:
-    """A regressor: a control, both engines' power over its mean, a channel, or its derivative from the past."""
-    if factor == "power":
+    """A regressor: a control, both engines' power as a thrust coefficient, a channel, or its derivative."""
+    if factor == "CT":
         both = flight.controls["power_left"] + flight.controls["power_right"]
-        return np.asarray(both / max(float(np.mean(both)), 1.0))
+        return np.asarray(both / (flight.channel("airspeed") * _pressed_area(flight)))
     if factor in flight.controls:
         return flight.controls[factor]
     if factor.endswith("_dot"):
@@ -174,14 +200,25 @@ def _sensor_course(flight: Reconstruction, name: str, channel: str) -> FloatArra
     values = flight.channel(channel)
     if name.endswith("_dot"):
         return -0.1 * np.diff(values, prepend=values[:1]) / flight.dt  # backward: nothing of the sample to come
-    return 0.1 * (values - (0.0 if channel in ("alpha", "beta", "p", "q", "r") else np.median(values)))
+    return 0.1 * (values - (0.0 if channel in FROM_ZERO else flight.about.get(channel, float(np.median(values)))))
 
 
-def unit_of(term: str, component: str) -> float:
+def unit_of(term: str, component: str, reach: Mapping[str, float] | None = None) -> float:
     """What a generic coefficient of one stands for: of a force's or moment's coefficient, or a reading, per regressor.
 
-    Deviations are in the units of their channels, power in shares of its mean.
+    Deviations are in the units of their channels; CT is power over airspeed, dynamic pressure and wing area.
+
+    Args:
+        reach: of the records.
     """
+    course = term.removeprefix("slow_")
+    if component == "propulsion":
+        course = course.partition("*")[2]
+    own = component == f"sensor:{course}"  # a scale error is no course
+    return _unit(term, component) / (1.0 if own or reach is None else reach.get(course, 1.0))
+
+
+def _unit(term: str, component: str) -> float:
     if component.endswith("_path"):
         return PATH_SIZE[term] if term in PATH_SIZE else PATH_SIZE["1"] / DEVIATION[term]
     if component == "propulsion":
@@ -198,10 +235,14 @@ def unit_of(term: str, component: str) -> float:
     return size
 
 
-def _scales(flight: Reconstruction) -> dict[str, float]:
-    """Acceleration per unit coefficient [m/s2, rad/s2] at the record's median condition."""
-    p = flight.parameters[0]
+def _pressed_area(flight: Reconstruction) -> FloatArray:
+    """Dynamic pressure times wing area along a record [N], N."""
     rho = density(float(np.median(flight.altitude)))
-    qs = 0.5 * rho * float(np.median(flight.channel("airspeed"))) ** 2 * p["wing_area"]
+    return np.asarray(0.5 * rho * flight.channel("airspeed") ** 2 * flight.parameters[0]["wing_area"])
+
+
+def _scales(flight: Reconstruction) -> dict[str, FloatArray]:
+    """Acceleration per unit coefficient along a record [m/s2, rad/s2], each [N]."""
+    p, qs = flight.parameters[0], _pressed_area(flight)
     return {"u": qs / p["mass"], "v": qs / p["mass"], "w": qs / p["mass"], "p": qs * p["span"] / p["inertia_xx"],
             "q": qs * p["chord"] / p["inertia_yy"], "r": qs * p["span"] / p["inertia_zz"]}  # fmt: skip
