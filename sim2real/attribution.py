@@ -17,8 +17,9 @@ from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
 from sim2real.candidates import NUISANCE_STEP, Bank
-from sim2real.form import Form, gain, home, own_terms, room, shares, split, with_terms, without
+from sim2real.form import Form, may_bend, own_terms, room, shares, split, squares, with_terms
 from sim2real.generic import UnknownFit, beside, fit_unknown
+from sim2real.home_terms import gain, without
 from sim2real.hypotheses import (
     P_BESIDE,
     P_NONE,
@@ -98,7 +99,7 @@ def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision
         log = float(logsumexp([e.log_evidence for e in own]) - np.log(parameters))
         found.append(Hypothesis(_alone(fits[name]), None, single, log))
     found += _several(reduced, bank, [i for i, f in enumerate(bank.families) if f in by_family])
-    found = [replace(h, form=_form(reduced, bank, h.fit)) if h.effects else h for h in found]
+    found = [replace(h, form=_form(reduced, gram, bank, h.fit)) if h.effects else h for h in found]
     found, unknown_fits = homes(found, fit_unknown(reduced, bank), float(reduced[0, 0]), gram)
     least = min([h.left for h in found] + [u.left for u in unknown_fits] + [noise])
     found = forgive(found, float(reduced[0, 0]), least)
@@ -161,7 +162,7 @@ def _merged(fits: list[SetFit], testable: int) -> list[Hypothesis]:
     return [Hypothesis(fit, None, set_prior(fit.effects, testable), fit.log_evidence) for fit in chosen.values()]
 
 
-def _form(reduced: FloatArray, bank: Bank, fit: SetFit) -> Form:
+def _form(reduced: FloatArray, raw: FloatArray, bank: Bank, fit: SetFit) -> Form:
     """A set in another form (see `sim2real.form`), its sizes free to give way."""
     terms, slopes = own_terms(fit.effects, bank.terms), _slopes(fit)
     first = 1 + len(slopes)
@@ -172,9 +173,12 @@ def _form(reduced: FloatArray, bank: Bank, fit: SetFit) -> Form:
     for m, slope in enumerate(slopes):
         chosen[1 + m, list(slope)] = list(slope.values())
     chosen[range(first, len(chosen)), [term.row for term in terms]] = 1.0
-    square = room(fit, reduced, terms, float(reduced[0, 0]))
+    rows = [term.row for term in terms]
+    kept = np.diag(reduced)[rows] / np.maximum(np.diag(raw)[rows], 1e-9)
+    own = squares(fit, reduced)
+    square = room(fit, own, may_bend(own, squares(fit, raw)), terms, kept, float(reduced[0, 0]))
     return gain(*without(chosen @ reduced @ chosen.T, first), square, fit.misfit,
-                shares(len(fit.families)), len(home(fit.effects)))
+                shares(len(fit.families)), [term.component for term in terms])
 
 
 def _with_unknown(reduced: FloatArray, raw: FloatArray, bank: Bank, known: Hypothesis,

@@ -49,7 +49,9 @@ def _moved(form: Form, now: Hypothesis, then: Hypothesis) -> Form:
     for k in range(min(len(shares(2)) + 1, *(len(f.gained) for f in (form, one, other)))):
         gained[k] += one.gained[k] - other.gained[k]
         left[k] = form.left[k] + one.left[k] - other.left[k]
-    return Form(tuple(gained), tuple(left), one.free)
+    more = form.left[0] - other.left[0]
+    free, bent = ([replace(at, beyond=at.beyond + more) for at in places] for places in (one.free, one.bent))
+    return Form(tuple(gained), tuple(left), tuple(free), bent=tuple(bent))
 
 
 def corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior) -> Hypothesis:

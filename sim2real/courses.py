@@ -7,7 +7,7 @@ flown once about the model: the filter follows the record, so that an explanatio
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from icing_env.record import FloatArray
 from sim2real.evidence import Evidence, compare, predicted
 from sim2real.paths import PATHS
-from sim2real.predictor import innovations
+from sim2real.predictor import Push, innovations
 from sim2real.terms import Term, at_any_time, pushes
 
 BENT = 0.0025  # of what a free course takes, that flights about the model leave because responses bend (assumed)
@@ -30,16 +30,18 @@ class Remainder:
         first: the first of these.
         rows: those before it, of every record [N x channels, first], but for the paths.
         excess: whitened square above noise that is left in paths, by component.
+        held: nuisances (by row) that are as far as they may be, and give way no more.
     """
 
     gram: FloatArray
     first: int
     rows: list[FloatArray]
     excess: dict[str, float]
+    held: tuple[int, ...] = ()
 
     def reduced(self) -> FloatArray:
         """Inner products of what is left (row 0) and of generic terms, everything else free to give way."""
-        return projected(self.gram, self.first)
+        return projected(self.gram, self.first, self.held)
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,15 @@ class Courses:
         self._flown: dict[str, list[FloatArray]] = {}
         self._terms: list[tuple[FloatArray, FloatArray]] = []
         self._freed: dict[tuple[str, ...], list[Freed]] = {}
+        self._pushed: list[tuple[Push, ...]] = []
+
+    def pushed(self, terms: Sequence[Term], weights: Mapping[int, float], rows: int) -> list[tuple[Push, ...]]:
+        """What generic terms of given weights together push in every record, for each of some rows."""
+        if not weights:
+            return [()] * len(self.evidences)
+        if not self._pushed:
+            self._pushed = [_pushes(e, terms) for e in self.evidences]
+        return [_together(pushes, weights, rows) for pushes in self._pushed]
 
     def of_terms(self, terms: Sequence[Term]) -> list[tuple[FloatArray, FloatArray]]:
         """What generic terms make of every record [N x channels, terms], and its inner products; always the same."""
@@ -102,21 +113,37 @@ class Courses:
         for rows, freed in zip(left.rows, self.at(components), strict=False):
             gram = gram - freed.taken(rows, self.tempering)
             taken -= freed.chance
-        by_courses = float(projected(before, left.first)[0, 0] - projected(gram, left.first)[0, 0])
+        by_courses = float(projected(before, left.first, left.held)[0, 0]
+                           - projected(gram, left.first, left.held)[0, 0])
         return max(taken + (1.0 + BENT) * by_courses, 0.0)
 
 
 def _flown(evidence: Evidence, terms: Sequence[Term]) -> FloatArray:
     """What terms make of one record, flown about the model [N x channels, terms]."""
+    rows = np.repeat(evidence.flight.parameters, 1 + len(terms))
+    return compare(evidence.flight, rows, _pushes(evidence, terms), evidence.gain, evidence.factor,
+                   keep=range(1, len(rows))).rows
+
+
+def _pushes(evidence: Evidence, terms: Sequence[Term]) -> tuple[Push, ...]:
     flight = evidence.flight
-    rows = np.repeat(flight.parameters, 1 + len(terms))
     base = innovations(flight, flight.parameters, evidence.gain.K)[:, 0]
-    pushed = pushes(replace(flight, measured=predicted(flight, base)), terms)
-    return compare(flight, rows, pushed, evidence.gain, evidence.factor, keep=range(1, len(rows))).rows
+    return pushes(replace(flight, measured=predicted(flight, base)), terms)
 
 
-def projected(gram: FloatArray, first: int) -> FloatArray:
-    """Inner products of row 0 and of the rows from `first` on, those between free to give way."""
-    gone, kept = np.arange(1, first), np.r_[0, first : len(gram)]
+def _together(pushed: Sequence[Push], weights: Mapping[int, float], rows: int) -> tuple[Push, ...]:
+    """Weighted pushes, one for each target and row."""
+    series: dict[tuple[str, bool], FloatArray] = {}
+    for push in pushed:
+        if weight := weights.get(push.row, 0.0):
+            at = (push.target, push.sensor)
+            series[at] = series.get(at, 0.0) + weight * push.series
+    return tuple(Push(row, target, course, sensor)
+                 for (target, sensor), course in series.items() for row in range(rows))  # fmt: skip
+
+
+def projected(gram: FloatArray, first: int, held: Collection[int] = ()) -> FloatArray:
+    """Inner products of row 0 and of the rows from `first` on, those between but for `held` free to give way."""
+    gone, kept = np.array([j for j in range(1, first) if j not in held], np.intp), np.r_[0, first : len(gram)]
     across = gram[np.ix_(gone, kept)]
     return np.asarray(gram[np.ix_(kept, kept)] - across.T @ np.linalg.solve(gram[np.ix_(gone, gone)], across))

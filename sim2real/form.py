@@ -12,14 +12,14 @@ Gaussian's gives a Student's t), up to a share of what the set explains. What is
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import logsumexp
 
 from icing_env import effects
 from icing_env.record import FloatArray
-from sim2real.candidates import Family
+from sim2real.bends import bends_with
 from sim2real.generic import UnknownFit
 from sim2real.sets import SetFit
 from sim2real.terms import Term
@@ -29,7 +29,7 @@ OTHER_FORM = 0.5  # prior probability that an effect has not the library's form 
 SHARES = (0.15, 0.4, 0.8)
 # Of its signature, that a set may leave over for no reason that anybody could name; and where a component that it does
 # not enter would be a reason (assumed).
-FORGIVEN, LEAK = 0.3, 0.005
+FORGIVEN, LEAK = 0.3, 0.015
 UNKNOWN_FORGIVEN = 1.0  # the same of what generic terms explain where something unknown is (assumed)
 DIRECTIONS = 10.0  # in which such a remainder lies for every component at home (assumed)
 LUCK = 15.0  # whitened square that a free course at one component takes by luck (deviation of 120 knots' chance)
@@ -51,12 +51,14 @@ class Liberty:
     """Where a set may be of another form.
 
     free: whitened square that a free course of time would take there of what the set leaves, beyond chance; places:
-    components that it has; most: whitened square that it may leave there for no reason that anybody could name.
+    components that it has; most: whitened square that it may leave there for no reason that anybody could name; beyond:
+    what the course of time leaves.
     """
 
     free: float = np.inf
     places: int = 1
     most: float = np.inf
+    beyond: float = -np.inf
 
 
 @dataclass(frozen=True)
@@ -64,12 +66,15 @@ class Form:
     """A set in another form, by how much generic terms at home may take (nothing first).
 
     gained: log evidence that they add, prior included; left: whitened square after them, luck taken out; free: at the
-    home of each member, then of all.
+    home of each member, then of all; weights: of the terms where they were flown, by row of the bank; bent: `free` of
+    the ways in which terms were flown, if they were.
     """
 
     gained: tuple[float, ...]
     left: tuple[float, ...]
     free: tuple[Liberty, ...] = (Liberty(),)
+    weights: dict[int, float] = field(default_factory=dict)
+    bent: tuple[Liberty, ...] = ()
 
     @property
     def least(self) -> float:
@@ -88,14 +93,14 @@ class Form:
 
     def way(self, k: int, nothing: float, noise: float, bare: float) -> float:
         """The same of one way, by how much the terms may take."""
-        left = self.left[k]
-        found = [forgiven(left - noise, nothing - left, max(self.left[0] - at.free - bare, 0.0), at.places, at.most)
-                 for at in self.free]
+        left, free = self.left[k], self.bent if self.bent and 0 < k <= len(SHARES) else self.free
+        found = [forgiven(left - noise, nothing - left, max(at.beyond - bare, 0.0), at.places, at.most) for at in free]
         return self.gained[k] + float(logsumexp(found) - np.log(len(found)))
 
     def bare(self) -> float:
         """Whitened square that is left beside free courses of time, a little for luck."""
-        return min(self.left[0] - at.free + LUCK * at.places for at in self.free)
+        return min([self.left[0], *(at.beyond + LUCK * at.places for at in (*self.free, *self.bent)
+                                    if np.isfinite(at.beyond))])  # fmt: skip
 
 
 def forgiven(left: float, explained: float, foreign: float = 0.0, places: int = 1, most: float = np.inf) -> float:
@@ -136,98 +141,59 @@ def _places(name: str) -> set[str]:
     return {c for at in effects.LIBRARY[name].enters_at for c in ALIKE.get(at, (at,))} | set(ALSO.get(name, ()))
 
 
-def energies(fit: SetFit, reduced: FloatArray, explained: float) -> list[float]:
-    """Whitened square of each member's own signature, no more than the set explains; of one alone all of that."""
-    if len(fit.families) == 1:
-        return [explained]
-    return [min(_energy(fit, family, reduced), explained) for family in fit.families]
+def squares(fit: SetFit, inner: FloatArray) -> list[float]:
+    """Whitened square of each member's own signature, in inner products of the rows of the bank."""
+    found = []
+    for family in fit.families:
+        rows = [row for row in family.rows if row in (fit.weights or {})]
+        w = np.array([(fit.weights or {})[row] for row in rows])
+        found.append(float(w @ inner[np.ix_(rows, rows)] @ w))
+    return found
 
 
-def _energy(fit: SetFit, family: Family, reduced: FloatArray) -> float:
-    rows = [row for row in family.rows if row in (fit.weights or {})]
-    w = np.array([(fit.weights or {})[row] for row in rows])
-    return float(w @ reduced[np.ix_(rows, rows)] @ w)
+def energies(own: Sequence[float], explained: float) -> list[float]:
+    """The same, no more than a set explains; of one alone all of that."""
+    return [explained] if len(own) == 1 else [min(square, explained) for square in own]
 
 
-def room(fit: SetFit, reduced: FloatArray, terms: Sequence[Term], nothing: float) -> FloatArray:
+def room(fit: SetFit, own: Sequence[float], bending: Sequence[float], terms: Sequence[Term], kept: FloatArray,
+         nothing: float) -> FloatArray:
     """Whitened square that each term may take where rho is one [terms].
 
     Every member shares the square of its own signature (no more than the set explains) among the terms where it enters.
+    A power of the regressor of a derivative that it changes may be as large as the whole change of that derivative,
+    however much of this lies within the model's own uncertainty, if not all of it does.
 
     Args:
+        own: `squares` of the members, nuisances integrated out.
+        bending: of `may_bend`.
+        kept: share of each term's own square that nuisances leave [terms].
         nothing: whitened square that no explanation leaves.
     """
     explained = max(nothing - fit.misfit, 0.0)
     out = np.zeros(len(terms))
-    for family in fit.families:
-        energy = min(_energy(fit, family, reduced), explained)
-        own = np.array([term.component in _places(family.effect.name) for term in terms])
-        if energy > LEAST**2 and own.any():
-            out += own * energy / np.count_nonzero(own)
+    for family, square, whole in zip(fit.families, own, bending, strict=True):
+        energy = min(square, explained)
+        home = np.array([term.component in _places(family.effect.name) for term in terms])
+        if energy > LEAST**2 and home.any():
+            out += home * energy / np.count_nonzero(home)
+        bent = np.array([bends_with(family.effect, term.component, term.name) for term in terms])
+        out = np.maximum(out, bent * kept * whole / max(int(np.count_nonzero(bent)), 1))
     return out
 
 
-def without(gram: FloatArray, first: int) -> tuple[FloatArray, FloatArray]:
-    """Inner products of terms (from row `first` on) with one another and with row 0, the sizes between integrated out.
+def may_bend(own: Sequence[float], whole: Sequence[float]) -> list[float]:
+    """Whitened square that powers of its regressors may take, of each member: none within the model's uncertainty.
 
-    A size may move by its own uncertainty, which is the unit of its row.
+    Args:
+        own, whole: `squares`, nuisances integrated out and where they are.
     """
-    own, terms = np.arange(1, first), np.arange(first, len(gram))
-    inner, onto = gram[np.ix_(terms, terms)], gram[terms, 0]
-    if len(own):
-        moved = np.linalg.solve(gram[np.ix_(own, own)] + 1e-2 * np.eye(len(own)), gram[own])
-        inner, onto = inner - gram[np.ix_(terms, own)] @ moved[:, terms], onto - gram[np.ix_(terms, own)] @ moved[:, 0]
-    return inner, onto
+    return [square if beyond > LEAST**2 else 0.0 for beyond, square in zip(own, whole, strict=True)]
 
 
 def shares(members: int) -> tuple[float, ...]:
     """rho that a set may have: several effects with large remainders at home could be anything."""
     return SHARES if members == 1 else SHARES[:-1]
-
-
-def gain(inner: FloatArray, onto: FloatArray, square: FloatArray, misfit: float,
-         rho: Sequence[float] = SHARES, places: int = 1) -> Form:
-    """What generic terms at home add to a set, averaged over the prior of another form.
-
-    Args:
-        inner: inner products of the terms [m, m], nuisances and sizes integrated out.
-        onto: of the terms with what the set leaves over [m].
-        square: of `room` [m].
-        misfit: whitened square that the set leaves over.
-        rho: of `shares`.
-        places: components that are home.
-    """
-    used = np.flatnonzero((np.diag(inner) > 1e-9) & (square > 0.0))
-    if not len(used):
-        return Form((0.0,), (misfit,), (Liberty(places=places),))
-    logs, taken = [0.0], [0.0]
-    for share in rho:
-        most = share**2 * square[used]
-        size = np.sqrt(most / np.diag(inner)[used])
-        scaled = inner[np.ix_(used, used)] * size[:, None] * size
-        along = onto[used] * size
-        at = np.linalg.solve(np.eye(len(used)) + scaled, along)
-        log = 0.5 * float(along @ at) - 0.5 * float(np.linalg.slogdet(np.eye(len(used)) + scaled)[1])
-        # a Gaussian prior alone would not forbid a larger remainder
-        logs.append(min(log, 0.5 * float(most.sum())))
-        share_of = np.linalg.solve(np.eye(len(used)) + scaled, scaled)  # of noise, that so many terms take
-        luck = float(2.0 * np.trace(share_of) - np.sum(share_of * share_of.T))
-        taken.append(min(max(float(2.0 * at @ along - at @ scaled @ at) - luck, 0.0), float(most.sum())))
-    return Form(tuple(log - float(np.log(len(logs))) for log in logs), tuple(misfit - t for t in taken),
-                (Liberty(places=places),))
-
-
-def given(left: FloatArray, rows: Sequence[int], square: FloatArray, share: float) -> FloatArray:
-    """Inner products `left` after generic terms at `rows` have taken what `share` of the prior's allows them.
-
-    Args:
-        left: of what is left (row 0) and of generic terms.
-        square: of `room` [rows].
-    """
-    used = [(row, share**2 * s / left[row, row]) for row, s in zip(rows, square, strict=True)
-            if left[row, row] > 1e-9 and s > 0.0]  # fmt: skip
-    at, variance = [row for row, _ in used], np.array([v for _, v in used])
-    return np.asarray(left - left[:, at] @ np.linalg.solve(left[np.ix_(at, at)] + np.diag(1.0 / variance), left[at]))
 
 
 def alike(fit: SetFit, unknown: UnknownFit, raw: FloatArray) -> float:
@@ -259,7 +225,14 @@ def is_own(fit: SetFit, unknown: UnknownFit, nothing: float, raw: FloatArray) ->
     """Whether what generic terms take beside a set is another form of its effects, by place and by size or shape."""
     taken = fit.misfit - unknown.misfit
     most = max(shares(len(fit.families))) ** 2 * max(nothing - fit.misfit, 0.0)
-    return at_home(unknown.component, fit.effects) and (taken <= most or alike(fit, unknown, raw) > SHAPE)
+    return at_home(unknown.component, fit.effects) and (taken <= most or alike(fit, unknown, raw) > SHAPE
+                                                        or _bent(fit, unknown))
+
+
+def _bent(fit: SetFit, unknown: UnknownFit) -> bool:
+    """Whether generic terms are powers of the regressors of derivatives that a set changes, and nothing else."""
+    return all(any(bends_with(family.effect, unknown.component, name) for family in fit.families)
+               for name, _, _ in unknown.terms)  # fmt: skip
 
 
 def split(fit: SetFit, fits: Sequence[UnknownFit], nothing: float,

@@ -58,6 +58,11 @@ class Hypothesis:
         return min([own, *forms, *([] if self.instead is None else [self.instead.left])])
 
     @property
+    def pushed(self) -> dict[int, float]:
+        """Weights of the generic terms that it is flown with: of something unknown, or of its other form."""
+        return self.unknown.weights if self.unknown else self.form.weights if self.form else {}
+
+    @property
     def weights(self) -> dict[int, float]:
         """Of the flown rows, beside the model's."""
         return (self.fit.weights or {}) | (self.unknown.weights if self.unknown else {})
@@ -141,7 +146,7 @@ def homes(found: Sequence[Hypothesis], alone: Sequence[UnknownFit], nothing: flo
     """
     out, left = list(found), []
     for u in alone:
-        near = [i for i, h in enumerate(out) if is_home(h, u, nothing, raw)]
+        near = [i for i, h in enumerate(out) if is_home(h, u, nothing - u.misfit, nothing - h.fit.misfit, raw)]
         if not near:
             left.append(u)
             continue
@@ -151,12 +156,16 @@ def homes(found: Sequence[Hypothesis], alone: Sequence[UnknownFit], nothing: flo
     return out, tuple(left)
 
 
-def is_home(h: Hypothesis, unknown: UnknownFit, nothing: float, raw: FloatArray) -> bool:
-    """Whether a single effect that enters where generic terms do says most of what they say, or the like of it."""
+def is_home(h: Hypothesis, unknown: UnknownFit, told: float, explained: float, raw: FloatArray) -> bool:
+    """Whether a single effect that enters where generic terms do says most of what they say, or the like of it.
+
+    Args:
+        told, explained: whitened square that the terms and the effect explain.
+        raw: inner products of all rows of the bank.
+    """
     if len(h.effects) != 1 or h.unknown is not None or not at_home(unknown.component, h.effects):
         return False
-    told = nothing - unknown.misfit
-    return told > 0.0 and (nothing - h.fit.misfit > MOSTLY * told or alike(h.fit, unknown, raw) > SHAPE)
+    return told > 0.0 and (explained > MOSTLY * told or alike(h.fit, unknown, raw) > SHAPE)
 
 
 def forgive(found: Sequence[Hypothesis], nothing: float, least: float, bare: float = 0.0,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 from icing_env import effects
 from icing_env.record import FloatArray
@@ -19,10 +20,10 @@ from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.sets import SetFit
 
-ROUNDS = 4
+ROUNDS = 6
 SETTLED = 0.2  # gain of half the whitened square that is worth another round
 FAR = 1000.0  # whitened square above the linear fit's that makes another start worth a flight
-FARTHEST = 15.0  # standard deviations of a nuisance: its prior counts, and what is beyond may not fly
+FARTHEST = 5.0  # standard deviations of a nuisance: what is beyond is no nuisance but a gap
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Point:
     """A set at given sizes [k] and nuisances [n], flown.
 
     cost: half the whitened square it leaves, the nuisances' prior included, tempered; slope and information: of sizes
-    (in ranges of their parameters), then nuisances.
+    (in ranges of their parameters), then nuisances; weights: of the generic terms flown with it, by row of the bank.
     """
 
     sizes: FloatArray
@@ -38,6 +39,19 @@ class Point:
     cost: float
     slope: FloatArray
     information: FloatArray
+    weights: Mapping[int, float] = field(default_factory=dict)
+
+    @property
+    def held(self) -> NDArray[np.intp]:
+        """Nuisances that have gone as far as they may."""
+        return np.flatnonzero(np.abs(self.nuisances) > FARTHEST - 1e-9)
+
+    def without_held(self) -> Point:
+        """The same with these as constants."""
+        at, slope, information = len(self.sizes) + self.held, self.slope.copy(), self.information.copy()
+        slope[at], information[at], information[:, at] = 0.0, 0.0, 0.0
+        information[at, at] = 1.0
+        return replace(self, slope=slope, information=information)
 
 
 @dataclass(frozen=True)
@@ -56,30 +70,28 @@ class Flying:
 
         Where that is far worse than the linear fit had it, from the published model if that is nearer.
         """
-        low, high = (np.array([getattr(f.parameter, end) for f in fit.families]) for end in ("low", "high"))
-        at = np.array(fit.estimate)
+        at, span = np.array(fit.estimate), _ranges(fit)
         best, share = self.point(fit, at, np.clip(start, -FARTHEST, FARTHEST)), 1.0
         if 2.0 * best.cost > fit.misfit + FAR:
             best = min(best, self.point(fit, at, np.zeros_like(start)), key=lambda point: point.cost)
         for _ in range(ROUNDS):
-            step = -share * np.linalg.solve(best.information, best.slope)
-            if -0.5 * float(step @ best.slope) < SETTLED:
+            step = share * bounded_step(best.information, best.slope, *rooms(fit, best, span))
+            if -float(step @ best.slope) - 0.5 * float(step @ best.information @ step) < SETTLED:
                 break
-            k = len(low)
-            sizes = np.clip(best.sizes + step[:k] * (high - low), low, high)
-            tried = self.point(fit, sizes, np.clip(best.nuisances + step[k:], -FARTHEST, FARTHEST))
+            k = len(span)
+            tried = self.point(fit, best.sizes + step[:k] * span, best.nuisances + step[k:])
             best, share = (tried, 1.0) if tried.cost < best.cost else (best, 0.5 * share)
-        return best
+        return best.without_held()
 
     def point(self, fit: SetFit, sizes: FloatArray, nuisances: FloatArray) -> Point:
         """A set flown at given sizes [k] and nuisances [n]."""
         k, n = len(sizes), len(nuisances)
-        steps = _steps(fit, sizes)
+        steps = size_steps(fit, sizes)
         gram = np.zeros((1 + k + n, 1 + k + n))
         for flight, evidence in zip(self.flights, self.evidences, strict=True):
             rows = _rows(flight, self.candidates, fit, sizes, steps, nuisances)
             gram += compare(flight, rows, (), evidence.gain, evidence.factor).gram / self.tempering
-        span = np.array([f.parameter.high - f.parameter.low for f in fit.families])
+        span = _ranges(fit)
         unit = np.concatenate([[1.0], span / steps if k else [], np.full(n, 1.0 / NUISANCE_STEP)])
         gram = gram * unit[:, None] * unit
         prior = self.baseline.precision
@@ -96,15 +108,16 @@ class Flying:
         What generic terms would make of the records is taken from flights about the model.
         """
         terms, k, n = self.candidates.terms, len(point.sizes), len(point.nuisances)
-        first, steps = 1 + k + n, _steps(fit, point.sizes)
+        first, steps = 1 + k + n, size_steps(fit, point.sizes)
         moved = tuple(replace(term, row=first + j) for j, term in enumerate(terms))
         gram, kept, left_in = np.zeros((first + len(terms),) * 2), [], dict.fromkeys(PATHS, 0.0)
-        for flight, evidence, (generic, inner) in zip(self.flights, self.evidences, self.courses.of_terms(terms),
-                                                      strict=True):
+        pushed = self.courses.pushed(terms, point.weights, first)
+        for flight, evidence, (generic, inner), pushes in zip(
+                self.flights, self.evidences, self.courses.of_terms(terms), pushed, strict=True):
             rows = _rows(flight, self.candidates, fit, point.sizes, steps, point.nuisances)
             for component in PATHS:
                 left_in[component] += excess(flight, rows[:1], component) / self.tempering
-            own = compare(flight, rows, (), evidence.gain, evidence.factor, keep=range(first)).rows
+            own = compare(flight, rows, pushes, evidence.gain, evidence.factor, keep=range(first)).rows
             across = own.T @ generic
             rows = np.concatenate([rows, np.repeat(rows[:1], len(terms))])
             gram += (np.block([[own.T @ own, across], [across.T, inner]])
@@ -116,7 +129,7 @@ class Flying:
         gram[0, first - n : first] = gram[first - n : first, 0]
         gram[0, 0] += point.nuisances @ precision @ point.nuisances
         gram[1 : 1 + k, 1 : 1 + k] += 1e-2 * np.eye(k)
-        return Remainder(gram, first, kept, left_in)
+        return Remainder(gram, first, kept, left_in, tuple(int(j) for j in 1 + k + point.held))
 
     def beside(self, fit: SetFit, point: Point, home: Collection[str]) -> list[FloatArray]:
         """Inner products of every effect of the library (rows of the bank) about a set where it was flown.
@@ -135,11 +148,40 @@ class Flying:
             if freed:
                 taken += freed[i].taken(found.rows, self.tempering)
         prior, nothing = self.baseline.precision, np.zeros_like(self.baseline.precision)
-        return [reduce(with_prior(gram, self.candidates, prior, point.nuisances), self.candidates, nothing)
-                for gram in (total, total - taken)]
+        return [reduce(_holding(1 + point.held, with_prior(gram, self.candidates, prior, point.nuisances)),
+                       self.candidates, nothing) for gram in (total, total - taken)]
 
 
-def _steps(fit: SetFit, sizes: FloatArray) -> FloatArray:
+def _holding(rows: NDArray[np.intp], gram: FloatArray) -> FloatArray:
+    """Inner products where some rows are constants that give way no more."""
+    out = gram.copy()
+    out[rows], out[:, rows] = 0.0, 0.0
+    out[rows, rows] = 1.0
+    return out
+
+
+def _ranges(fit: SetFit) -> FloatArray:
+    return np.array([f.parameter.high - f.parameter.low for f in fit.families])
+
+
+def rooms(fit: SetFit, point: Point, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """How far sizes (in units of `unit` [k]) and nuisances may still go, down and up [k + n]."""
+    low, high = (np.array([getattr(f.parameter, end) for f in fit.families]) for end in ("low", "high"))
+    ends = np.sort([(low - point.sizes) / unit, (high - point.sizes) / unit], axis=0)
+    nuisances = np.clip(point.nuisances, -FARTHEST, FARTHEST)
+    return np.r_[np.minimum(ends[0], 0.0), -FARTHEST - nuisances], np.r_[np.maximum(ends[1], 0.0), FARTHEST - nuisances]
+
+
+def bounded_step(information: FloatArray, slope: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """The step between `low` and `high` that lowers half the whitened square most, taken as a quadratic."""
+    step = -np.linalg.solve(information, slope)
+    if np.all((low <= step) & (step <= high)):
+        return np.asarray(step)
+    root = np.linalg.cholesky(information)
+    return np.asarray(lsq_linear(root.T, -np.linalg.solve(root, slope), (low - 1e-12, high + 1e-12), method="bvls").x)
+
+
+def size_steps(fit: SetFit, sizes: FloatArray) -> FloatArray:
     """Step of each size for its slope: about its uncertainty, inwards."""
     out = np.zeros(len(sizes))
     for m, (family, size) in enumerate(zip(fit.families, sizes, strict=True)):

@@ -15,26 +15,30 @@ import numpy as np
 from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
+from sim2real.companions import companions, leading, together
 from sim2real.corrections import corrected, inherited
 from sim2real.courses import Remainder
 from sim2real.form import (
     FORGIVEN,
     OTHER_FORM,
+    SHAPE,
     SHARES,
     UNKNOWN_FORGIVEN,
     Form,
     Liberty,
+    alike,
     energies,
-    gain,
-    given,
     home,
+    may_bend,
     own_terms,
     room,
     shares,
     split,
+    squares,
     with_terms,
 )
 from sim2real.generic import UnknownFit, fit_unknown
+from sim2real.home_terms import given
 from sim2real.hypotheses import (
     P_BESIDE,
     P_NONE,
@@ -46,26 +50,14 @@ from sim2real.hypotheses import (
     normalised,
     set_prior,
 )
+from sim2real.other_form import WORTH, Bent, flown_squares, flown_unknown, other_form
 from sim2real.points import Flying, Point
 from sim2real.sets import SetFit
-from sim2real.singles import EffectFit, fit_family
 from sim2real.terms import Term
 
-LEADING, LIKELY = 2, 0.02  # explanations that are flown again, and how probable they have to be
-CERTAIN = 0.05  # probability of no gap above which nothing is: sizes near zero have no likelihood of Gaussian shape
-MOST = 7  # explanations flown again; what looks better then and has not been flown is not believed
+MOST = 9  # explanations flown again; what looks better then and has not been flown is not believed
+PART = 0.1  # of what a set is more probable than nothing (in logarithms), that an effect flown for its sake is alone
 FEW_PLACES = 5  # components at which courses of time are freed together
-COMPANIONS, WORTH = 2, 5.0  # effects flown beside the best single one, and the log evidence that they have to add
-
-
-def leading(posterior: Posterior) -> list[Hypothesis]:
-    """Explanations to fly again where there is a gap at all: the probable ones, and the best single effect."""
-    if posterior.none > CERTAIN:
-        return []
-    known = sorted((h for h in posterior.hypotheses if h.unknown is None), key=lambda h: -h.log_posterior)
-    chosen = [h for h in known if h.probability > LIKELY][:LEADING]
-    chosen += [h for h in known if len(h.effects) == 1 and h not in chosen][:1]
-    return chosen if any(h.effects for h in chosen) else []
 
 
 def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior: Posterior) -> Posterior:
@@ -93,6 +85,7 @@ class _Search:
         self.before = list(self.found)  # as the linear fit has them
         self.points: dict[int, Point] = {}
         self.left: dict[int, Remainder] = {}
+        self.bent: dict[int, Bent] = {}
         self.generic: dict[int, list[UnknownFit]] = {}
         self.added: set[int] = set()  # proposed beside a flown one: no linear fit to correct others by
         self.nothing, self.noise = float(posterior.reduced[0, 0]), np.inf
@@ -113,12 +106,15 @@ class _Search:
         return max(known, key=lambda i: self.found[i].log_posterior)
 
     def first_of(self, i: int) -> int:
-        """A single effect of set `i` that was not flown yet, the most probable first; else the set.
+        """A single effect of set `i` that was not flown yet and explains a good part of it, the most probable first.
 
-        What flying a single effect corrects, all sets that hold it inherit.
+        What flying a single effect corrects, all sets that hold it inherit. If there is none, the set itself.
         """
+        bare = self.before[self.nothing_at_all()].log_posterior
+        least = PART * (self.found[i].log_posterior - bare)
         alone = [j for j, h in enumerate(self.found) if j not in self.points and h.unknown is None
-                 and len(h.effects) == 1 and set(h.effects) < set(self.found[i].effects)]  # fmt: skip
+                 and len(h.effects) == 1 and set(h.effects) < set(self.found[i].effects)
+                 and h.log_posterior - bare > least]  # fmt: skip
         return max(alone, key=lambda j: self.found[j].log_posterior, default=i)
 
     def _fly(self, i: int) -> None:
@@ -129,36 +125,56 @@ class _Search:
         left = self.left[i].reduced()
         self.generic[i] = self._fit_unknown(left)
         if h.effects:
-            rows, square = self._room(h)
-            form = gain(left[np.ix_(rows, rows)], left[rows, 0], square, h.fit.misfit, shares(len(h.effects)))
-            h = replace(h, form=replace(form, free=self._free(i, h.fit)), instead=None)
+            h = replace(h, form=self._form(i, h, left), instead=None)
         else:
             self.nothing = h.fit.misfit
         self.found[i] = h
 
-    def _room(self, h: Hypothesis) -> tuple[list[int], FloatArray]:
-        """Rows of the generic terms at home of a set in what it leaves, and what `room` there is for each."""
-        own = own_terms(h.effects, _moved(self.flying.candidates.terms))
-        return [term.row for term in own], room(h.fit, self.linear.reduced, own, self.nothing)
+    def _form(self, i: int, h: Hypothesis, left: FloatArray) -> Form:
+        """Another form of a flown set, itself flown where it takes much."""
+        flown = Bent(self.points[i], self.left[i])
+        form, bent = other_form(self.flying, h.fit, flown, *self._room(i, h, left), shares(len(h.effects)))
+        form = replace(form, free=self._free(h.fit, self.left[i]))
+        if bent is None:
+            return form
+        self.bent[i] = bent
+        return replace(form, bent=self._free(h.fit, bent.left))
 
-    def _free(self, i: int, fit: SetFit, beside: UnknownFit | None = None) -> tuple[Liberty, ...]:
+    def _room(self, i: int, h: Hypothesis, left: FloatArray) -> tuple[list[int], FloatArray]:
+        """Rows of the generic terms at home of a set in what it leaves (`left`), and what `room` there is for each."""
+        bank, raw = self.flying.candidates, self.linear.raw
+        own = own_terms(h.effects, _moved(bank.terms))
+        rows = [term.row for term in own]
+        whole = raw.diagonal()[[bank.terms[row - 1].row for row in rows]]
+        kept = left.diagonal()[rows] / np.maximum(whole, 1e-9)
+        # by slope or bank, the less: polynomials bend between sizes, and slopes are not those of smaller ones
+        flown = flown_squares(h.fit, Bent(self.points[i], self.left[i]))
+        reduced = squares(h.fit, self.linear.reduced)
+        bending = may_bend(list(map(min, flown[0], reduced)), list(map(min, flown[1], squares(h.fit, raw))))
+        return rows, room(h.fit, reduced, bending, own, kept, self.nothing)
+
+    def _free(self, fit: SetFit, left: Remainder, beside: UnknownFit | None = None) -> tuple[Liberty, ...]:
         """What free courses of time would take: at home of each effect, or where something unknown is; then at all.
 
         What a member may leave there goes with what it explains: one that explains little would else be named for the
         freedom of its home.
         """
         each = [home((family.effect.name,)) for family in fit.families]
-        most = [FORGIVEN**2 * e for e in energies(fit, self.linear.reduced, max(self.nothing - fit.misfit, 0.0))]
-        taken = 0.0
+        most = [FORGIVEN**2 * e for e in energies(squares(fit, self.linear.reduced),
+                                                       max(self.nothing - fit.misfit, 0.0))]
+        whole = float(left.reduced()[0, 0])
+        rest = whole if beside is None else beside.left
         if beside is not None:
-            taken = fit.misfit - beside.misfit
-            each, most = [*each, {beside.component}], [*most, UNKNOWN_FORGIVEN**2 * taken]
-        found = [Liberty(max(self.flying.courses.free(self.left[i], at) - taken, 0.0), len(at), share)
-                 for at, share in zip(each, most, strict=True)]
-        together = set().union(*each)
-        if len(each) > 1 and len(together) <= FEW_PLACES:
-            free = max(self.flying.courses.free(self.left[i], together) - taken, 0.0)
-            found.append(Liberty(free, len(together), sum(min(at.free, at.most) for at in found)))
+            each, most = [*each, {beside.component}], [*most, UNKNOWN_FORGIVEN**2 * (whole - beside.misfit)]
+
+        def at(places: set[str], most: float) -> Liberty:
+            free = max(self.flying.courses.free(left, places) - (whole - rest), 0.0)
+            return Liberty(free, len(places), most, rest - free)
+
+        found = [at(*one) for one in zip(each, most, strict=True)]
+        all_of_them = set().union(*each)
+        if len(each) > 1 and len(all_of_them) <= FEW_PLACES:
+            found.append(at(all_of_them, sum(min(one.free, one.most) for one in found)))
         return tuple(found)
 
     def nothing_at_all(self) -> int:
@@ -180,36 +196,17 @@ class _Search:
         return sorted(chosen, key=lambda i: -self.found[i].log_posterior)
 
     def companions(self) -> list[int]:
-        """Pairs of the best single effect, where it was flown, with whatever explains most of what it leaves.
-
-        And of what no free course of time would explain where that effect enters: its own form would hide a second one.
-        """
+        """Pairs of the best single effect, where it was flown, with what may stand beside it."""
         if not (alone := self._ranked(1)):
             return []
-        first, out = self.found[alone[0]], dict[str, EffectFit]()
-        for reduced in self.flying.beside(first.fit, self.points[alone[0]], home(first.effects)):
-            best: dict[str, EffectFit] = {}
-            for family in self.flying.candidates.families:
-                name = family.effect.name
-                if name in self.linear.fits and name not in first.effects:
-                    fit = fit_family(reduced, family)
-                    if name not in best or fit.log_evidence > best[name].log_evidence:
-                        best[name] = fit
-            promising = sorted(best.values(), key=lambda fit: -fit.log_evidence)[:COMPANIONS]
-            out |= {fit.family.effect.name: fit for fit in promising if fit.log_evidence > WORTH}
-        return [self._propose(first, fit) for fit in out.values()]
+        first = self.found[alone[0]]
+        return [self._propose(together(first.fit, fit))
+                for fit in companions(self.flying, self.linear, first.fit, self.points[alone[0]])]  # fmt: skip
 
-    def _propose(self, first: Hypothesis, second: EffectFit) -> int:
-        """Index of the pair, with sizes as found beside the first."""
+    def _propose(self, fit: SetFit) -> int:
+        """Index of a pair, with sizes as proposed if it was not flown yet."""
+        names = tuple(sorted(fit.effects))
         known = {h.effects: i for i, h in enumerate(self.found) if h.unknown is None}
-        names = tuple(sorted((*first.effects, second.family.effect.name)))
-        spread = np.array([[((second.high95 - second.low95) / 3.92) ** 2]])
-        one = first.fit
-        covariance = np.zeros((1, 1)) if one.covariance is None else one.covariance
-        fit = SetFit((*one.families, second.family), one.log_evidence + second.log_evidence,
-                     (*one.estimate, second.estimate), (*one.low95, second.low95), (*one.high95, second.high95),
-                     np.block([[covariance, np.zeros((1, 1))], [np.zeros((1, 1)), spread]]),
-                     (one.weights or {}) | second.weights, second.misfit)  # fmt: skip
         if names in known:
             i = known[names]
             if i not in self.points:
@@ -223,23 +220,30 @@ class _Search:
     def _beside(self, i: int) -> tuple[UnknownFit | None, list[Hypothesis]]:
         """Terms of a flown set's form, and something unknown beside it (alone if it is empty), its own form allowed."""
         known = self.found[i]
-        left, gained, own = self.left[i].reduced(), 0.0, None
-        fits = self.generic[i] if known.effects else [u for u in self.generic[i] if not self._named(u)]
+        remainder, gained, own = self.left[i], 0.0, None
+        fits = self.generic[i]
         if known.effects and known.form is not None:
             own, fits = split(known.fit, fits, self.nothing, self.linear.raw)
             ways = [known.form.way(k, self.nothing, self._least(), self._bare()) for k in range(len(known.form.gained))]
             if 0 < (k := int(np.argmax(ways))) <= len(SHARES):
                 gained = known.form.gained[k] + float(np.log(OTHER_FORM))
-                left = given(left, *self._room(known), SHARES[k - 1])
+                remainder = self.bent[i].left if i in self.bent else remainder
+                left = remainder.reduced()
+                left = given(left, *self._room(i, known, left), SHARES[k - 1])
                 fits = split(known.fit, self._fit_unknown(left), self.nothing, self.linear.raw)[1]
+        fits = [u for u in fits if not self._named(u, known)]
         if not fits:
             return own, []
         best = max(fits, key=lambda u: u.log_evidence)
+        if not known.effects and best.log_evidence > WORTH:
+            flown = flown_unknown(self.flying, known.fit, Bent(self.points[i], self.left[i]), best)
+            fits = [flown if u is best else u for u in fits]
+            best = max(fits, key=lambda u: u.log_evidence)
         more = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
         prior = np.log(P_BESIDE / (1.0 - P_NONE)) + known.log_prior if known.effects else np.log(P_UNKNOWN)
         return own, [Hypothesis(known.fit, best, float(prior),
                                 known.log_evidence + gained + more,
-                                Form((0.0,), (best.left,), self._free(i, known.fit, best)))]
+                                Form((0.0,), (best.left,), self._free(known.fit, remainder, best)))]
 
     def _fit_unknown(self, left: FloatArray) -> list[UnknownFit]:
         """Generic terms on what a flown set leaves; their weights in rows of the bank."""
@@ -247,9 +251,16 @@ class _Search:
         return [replace(u, weights={bank.terms[row - 1].row: w for row, w in u.weights.items()})
                 for u in fit_unknown(left, replace(bank, terms=_moved(bank.terms)))]
 
-    def _named(self, unknown: UnknownFit) -> bool:
-        """Whether generic terms alone are another form of a single effect of the library."""
-        return any(is_home(h, unknown, self.nothing, self.linear.raw) for h in self.found)
+    def _named(self, unknown: UnknownFit, beside: Hypothesis) -> bool:
+        """Whether generic terms are another form of a single effect of the library; beside others, the like of it."""
+        raw = self.linear.raw
+        if not beside.effects:
+            linear = self.before[self.nothing_at_all()].fit.misfit  # what was not flown is compared with what was not
+            return any(is_home(h, unknown, self.nothing - unknown.misfit,
+                               (self.nothing if i in self.points else linear) - h.fit.misfit, raw)
+                       for i, h in enumerate(self.found))  # fmt: skip
+        return any(alike(h.fit, unknown, raw) > SHAPE for h in self.found
+                   if len(h.effects) == 1 and h.unknown is None and h.effects[0] not in beside.effects)  # fmt: skip
 
     def posterior(self) -> Posterior:
         """All hypotheses with their probabilities.
@@ -267,8 +278,14 @@ class _Search:
         flown, kept = [k for k, i in enumerate(chosen) if i in self.points], [found[i] for i in chosen] + others
         least = min([self._least(), *(h.left for h in others)])
         bare = self._bare()
-        told = normalised(forgive(kept, self.nothing, least, bare, flown), 0.0)
-        return replace(self.linear, hypotheses=told, bare=bare, settled=self.points[ranked[0]].nuisances)
+        told = forgive(kept, self.nothing, least, bare, flown)
+        bound = max(told[k].log_posterior for k in flown)
+        told = [h for k, h in enumerate(told) if k in flown or h.unknown is not None or h.log_posterior <= bound]
+        return replace(self.linear, hypotheses=normalised(told, 0.0), bare=bare, settled=self._settled(ranked[0]))
+
+    def _settled(self, i: int) -> FloatArray:
+        """Nuisances [n] where a flown set settled, in its other form where that was flown."""
+        return (self.bent[i].point if i in self.bent else self.points[i]).nuisances
 
 
 def _moved(terms: Sequence[Term]) -> tuple[Term, ...]:

@@ -11,6 +11,7 @@ from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.attribution import attribute, nuisance_mean, reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, shifted
+from sim2real.companions import leading
 from sim2real.courses import Courses
 from sim2real.evidence import SIGMAS, Evidence, choose_gain, gather, predicted
 from sim2real.hypotheses import Hypothesis, Posterior, doubted, leaving_out, normalised
@@ -19,7 +20,7 @@ from sim2real.points import Flying
 from sim2real.predictor import innovations
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
-from sim2real.refine import leading, refine
+from sim2real.refine import refine
 from sim2real.terms import pushes
 
 SETTLING, SETTLED = 4, 3.0  # steps towards the best nuisances, and the whitened length of a step that ends them
@@ -147,7 +148,7 @@ def explained(evidence: Evidence, flight: Reconstruction, candidates: Bank, best
     row = shifted(flight.parameters, candidates.nuisances, nuisances, flight.power_from)
     if best.effects:
         row = effects.with_effects(row, best.fit.values)
-    moved, weights = replace(flight, parameters=row), best.unknown.weights if best.unknown else {}
+    moved, weights = replace(flight, parameters=row), best.pushed
     base = innovations(moved, row, evidence.gain.K)[:, 0]
     terms = [term for term in candidates.terms if term.row in weights]
     pushed = [replace(push, series=weights[push.row] * push.series)

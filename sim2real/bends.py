@@ -1,0 +1,47 @@
+"""Derivatives that bend: what an effect that changes a derivative may do with powers of that derivative's regressor.
+
+A fin that saturates with sideslip, or roll power that fades as the aileron goes out, is a derivative that is lower and
+a cube beside it. The lower derivative may lie within the model's own uncertainty; the cube never does. Where an effect
+changes several derivatives (ice), each may also be changed by more or less than the library has it.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from icing_env import aircraft
+from icing_env.effects import Effect, Parameter
+from icing_env.types import DERIVATIVE_NAMES
+
+COMPONENTS = {"CX": "x_force", "CY": "y_force", "CZ": "z_force", "Cl": "rolling_moment", "Cm": "pitching_moment",
+              "Cn": "yawing_moment"}  # fmt: skip
+
+
+@cache
+def changes(effect: Effect) -> frozenset[str]:
+    """Numbers of the aircraft (of PARAMETERS) that an effect changes."""
+    plain = aircraft.load()
+    row = plain.copy()
+    effect.apply(row, effect.neutral() | {p.name: _some(p) for p in effect.parameters})
+    return frozenset(name for name in row.dtype.names or () if np.any(row[name] != plain[name]))
+
+
+@cache
+def bends(effect: Effect) -> frozenset[tuple[str, str]]:
+    """Generic terms (component, name) that are powers of the regressors of the derivatives that an effect changes."""
+    changed = [name for name in DERIVATIVE_NAMES if name in changes(effect)]
+    pairs = [(COMPONENTS[name[:2]], name[3:].rstrip("2")) for name in changed if not name.endswith("_0")]
+    powers = (2, 3) if len(pairs) == 1 else (1, 2, 3)
+    return frozenset((component, "*".join([by] * power)) for component, by in pairs for power in powers)
+
+
+def bends_with(effect: Effect, component: str, name: str) -> bool:
+    """Whether a generic term is a power of the regressor of a derivative that an effect changes."""
+    return (component, name) in bends(effect)
+
+
+def _some(parameter: Parameter) -> float:
+    """A size that is not neutral."""
+    return parameter.typical or 0.5 * (parameter.neutral + max(parameter.low, parameter.high, key=abs))

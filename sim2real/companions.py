@@ -1,0 +1,66 @@
+"""What is flown at all: the leading explanations, and what may stand beside the best single effect."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim2real.bends import changes
+from sim2real.form import home
+from sim2real.hypotheses import Hypothesis, Posterior
+from sim2real.points import Flying, Point
+from sim2real.sets import SetFit
+from sim2real.singles import EffectFit, fit_family
+
+LEADING, LIKELY = 2, 0.02  # explanations that are flown again, and how probable they have to be
+CERTAIN = 0.05  # probability of no gap above which nothing is: sizes near zero have no likelihood of Gaussian shape
+COMPANIONS, WORTH = 2, 5.0  # effects flown beside the best single one, and the log evidence that they have to add
+SUSPECTS = 2  # effects flown beside it because a nuisance went as far as it may
+
+
+def leading(posterior: Posterior) -> list[Hypothesis]:
+    """Explanations to fly again where there is a gap at all: the probable ones, and the best single effect."""
+    if posterior.none > CERTAIN:
+        return []
+    known = sorted((h for h in posterior.hypotheses if h.unknown is None), key=lambda h: -h.log_posterior)
+    chosen = [h for h in known if h.probability > LIKELY][:LEADING]
+    chosen += [h for h in known if len(h.effects) == 1 and h not in chosen][:1]
+    return chosen if any(h.effects for h in chosen) else []
+
+
+def companions(flying: Flying, linear: Posterior, first: SetFit, point: Point) -> list[EffectFit]:
+    """Effects to fly beside a single one, with their sizes there.
+
+    What explains most of what it leaves; of what no free course of time would explain where it enters (its own form
+    would hide a second one); and what changes a number that went as far as a nuisance may.
+    """
+    out: dict[str, EffectFit] = {}
+    for reduced in flying.beside(first, point, home(first.effects)):
+        best: dict[str, EffectFit] = {}
+        for family in flying.candidates.families:
+            name = family.effect.name
+            if name in linear.fits and name not in first.effects:
+                fit = fit_family(reduced, family)
+                if name not in best or fit.log_evidence > best[name].log_evidence:
+                    best[name] = fit
+        promising = sorted(best.values(), key=lambda fit: -fit.log_evidence)[:COMPANIONS]
+        out |= {fit.family.effect.name: fit for fit in promising if fit.log_evidence > WORTH}
+        out |= {name: best[name] for name in suspects(flying, linear, point) if name in best}
+    return list(out.values())
+
+
+def suspects(flying: Flying, linear: Posterior, point: Point) -> list[str]:
+    """For nuisances that went as far as they may: the effect that changes that number, and least else."""
+    tested = {name: changes(fit.family.effect) for name, fit in linear.fits.items()}
+    moved = [flying.candidates.nuisances[j].parameter for j in point.held]
+    able = [[name for name, changed in tested.items() if number in changed] for number in moved]
+    return [min(names, key=lambda name: len(tested[name])) for names in able[:SUSPECTS] if names]
+
+
+def together(one: SetFit, second: EffectFit) -> SetFit:
+    """A set and an effect beside it, with sizes as found beside the set."""
+    spread = np.array([[((second.high95 - second.low95) / 3.92) ** 2]])
+    covariance = np.zeros((1, 1)) if one.covariance is None else one.covariance
+    return SetFit((*one.families, second.family), one.log_evidence + second.log_evidence,
+                  (*one.estimate, second.estimate), (*one.low95, second.low95), (*one.high95, second.high95),
+                  np.block([[covariance, np.zeros((1, 1))], [np.zeros((1, 1)), spread]]),
+                  (one.weights or {}) | second.weights, second.misfit)  # fmt: skip

@@ -1,0 +1,188 @@
+"""Powers of regressors, one condition for all records, nuisances with an end, forms weighed where they were flown."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from icing_env import effects, scenario
+from icing_env.aircraft import load
+from icing_env.types import DERIVATIVE_NAMES
+from sim2real.bends import bends, changes
+from sim2real.candidates import bank
+from sim2real.courses import Courses, projected
+from sim2real.evidence import gather
+from sim2real.generic import fit_unknown
+from sim2real.home_terms import gain
+from sim2real.other_form import Bent, bring, flown_unknown
+from sim2real.points import FARTHEST, Flying, bounded_step
+from sim2real.reconstruct import Reconstruction, reconstruct
+from sim2real.references import Baseline
+from sim2real.sets import SetFit
+from sim2real.terms import BEYOND, GENERIC, Term, in_common, pushes
+from testbed.flight import fly
+
+
+def products(seed: int, terms: int, left: float) -> np.ndarray:
+    """Inner products of a residual and of the signatures of terms, random."""
+    rng = np.random.default_rng(seed)
+    whole = np.column_stack([left * rng.standard_normal(300) / 10.0, 3.0 * rng.standard_normal((300, terms))])
+    whole[:, 0] += whole[:, 1:] @ rng.standard_normal(terms)
+    return whole.T @ whole
+
+
+def test_an_effect_bends_with_the_regressors_of_the_derivatives_that_it_changes():
+    assert bends(effects.get("aileron_power")) == {("rolling_moment", "aileron*aileron"),
+                                                   ("rolling_moment", "aileron*aileron*aileron")}
+    assert ("yawing_moment", "beta*beta*beta") in bends(effects.get("fin_ice"))
+    assert ("yawing_moment", "beta") in bends(effects.get("fin_ice"))  # ice changes derivatives in its own proportions
+    assert not bends(effects.get("alpha_bias")) and not bends(effects.get("pitch_trim"))
+    for effect in effects.LIBRARY.values():
+        assert changes(effect), effect.name
+        assert bool(bends(effect)) <= bool(changes(effect) & set(DERIVATIVE_NAMES))
+
+
+def test_a_derivative_that_an_effect_changes_alone_has_a_power_among_the_generic_terms():
+    known = {(component, name) for component, _, names in (*GENERIC, *BEYOND) for name in names}
+    for effect in effects.LIBRARY.values():
+        if len(changes(effect) & set(DERIVATIVE_NAMES)) == 1 and bends(effect):
+            assert bends(effect) & known, effect.name
+
+
+@given(st.integers(0, 200), st.floats(0.0, 30.0))
+def test_a_form_is_worth_as_much_wherever_its_terms_are_flown(seed, left):
+    """Where all is linear, flying the terms at any size changes nothing of their evidence."""
+    gram = products(seed, 4, left)
+    square = np.full(4, 4.0 * gram[0, 0])
+    plain = gain(gram[1:, 1:], gram[1:, 0], square, gram[0, 0])
+    at = np.random.default_rng(seed).standard_normal(4)
+    moved = np.eye(5)
+    moved[0, 1:] = at
+    there = moved @ gram @ moved.T
+    flown = gain(there[1:, 1:], there[1:, 0], square, gram[0, 0], flown=at, closer=gram[0, 0] - there[0, 0])
+    assert flown.gained == pytest.approx(plain.gained, rel=1e-6, abs=1e-4)
+    assert flown.left == pytest.approx(plain.left, rel=1e-6, abs=1e-4)
+
+
+def test_what_one_component_may_take_another_may_not():
+    """A little offset of one path is no reason for a large gearing there, however large another member's home is."""
+    inner, onto = np.diag([100.0, 100.0]), np.array([-3000.0, 0.0])  # 90,000 to be had at the first
+    square = np.array([10.0, 1e6])
+    apart = gain(inner, onto, square, 1e5, at=("elevator_path", "rolling_moment"))
+    together = gain(inner, onto, square, 1e5)
+    assert apart.least > 1e5 - 0.03 * 90_000.0 and together.least < 1e5 - 0.03 * 90_000.0
+    assert max(apart.gained) < 0.1 * max(together.gained)
+
+
+@given(st.integers(0, 500), st.floats(0.1, 5.0))
+def test_a_step_between_bounds_is_the_best_there(seed, width):
+    rng = np.random.default_rng(seed)
+    root = rng.standard_normal((8, 6))
+    information, slope = root.T @ root + 0.1 * np.eye(6), 5.0 * rng.standard_normal(6)
+    low, high = -width * rng.random(6) - 1e-3, width * rng.random(6) + 1e-3
+
+    def cost(x: np.ndarray) -> float:
+        return float(slope @ x + 0.5 * x @ information @ x)
+
+    step = bounded_step(information, slope, low, high)
+    assert np.all(step >= low - 1e-9) and np.all(step <= high + 1e-9)
+    for _ in range(50):
+        other = np.clip(step + 0.1 * width * rng.standard_normal(6), low, high)
+        assert cost(step) <= cost(other) + 1e-6
+    far = bounded_step(information, slope, np.full(6, -1e6), np.full(6, 1e6))
+    assert far == pytest.approx(-np.linalg.solve(information, slope))
+
+
+def test_what_is_held_gives_way_no_more():
+    gram = products(3, 5, 1.0)
+    assert projected(gram, 3)[0, 0] < projected(gram, 3, (2,))[0, 0] < projected(gram, 3, (1, 2))[0, 0]
+    assert projected(gram, 3, (1, 2))[0, 0] == pytest.approx(gram[0, 0])
+    assert FARTHEST >= 4.0  # one in a million of what is within the spread
+
+
+@pytest.fixture(scope="module")
+def flights() -> list[Reconstruction]:
+    """Two flights of one aircraft at two speeds."""
+    made = []
+    for speed in (55.0, 70.0):
+        chosen = scenario.load("clear_air", duration=20.0, initial={"airspeed": speed},
+                               parameters={"turbulence_sigma_w": 0.0})
+        made.append(reconstruct(fly(chosen, seed=3, observer=False, protection=False).record))
+    return made
+
+
+def course(flight: Reconstruction, name: str) -> np.ndarray:
+    return pushes(flight, [Term("pitching_moment", name, "q", 1)])[0].series
+
+
+def test_a_term_is_one_function_of_its_regressor_in_all_records(flights):
+    """As an acceleration it goes with dynamic pressure; as a coefficient it is the same at the same angle of attack."""
+    slow, fast = in_common(flights)
+    assert slow.about == fast.about
+    for flight in (slow, fast):
+        unit = course(flight, "1")
+        speed = flight.channel("airspeed")
+        assert unit / unit[0] == pytest.approx((speed / speed[0]) ** 2)
+        coefficient = course(flight, "alpha*alpha") / unit
+        deviation = (flight.channel("alpha") - slow.about["alpha"]) / 0.05
+        assert coefficient == pytest.approx(deviation**2 / slow.reach["alpha*alpha"])
+    assert np.mean(course(slow, "airspeed")) < 0.0 < np.mean(course(fast, "airspeed"))
+    assert slow.reach == fast.reach and min(slow.reach.values()) >= 1.0
+    for name in ("airspeed", "alpha*alpha*alpha", "elevator*elevator*elevator"):
+        both = np.concatenate([course(f, name) / course(f, "1") for f in (slow, fast)])
+        assert np.sqrt(np.mean(both**2)) <= 1.0 + 1e-9  # no flight with a cube that nothing reaches
+    own = replace(slow, about={})
+    assert abs(np.median(course(own, "airspeed") / course(own, "1"))) < 1e-6
+
+
+def test_thrust_counts_as_a_coefficient(flights):
+    slow, fast = in_common(flights)
+    per_unit = [np.median(course(f, "CT") / course(f, "1")) for f in (slow, fast)]
+    assert per_unit[0] * per_unit[1] < 0.0  # one below the median of both, one above
+
+
+@pytest.fixture(scope="module")
+def bent() -> tuple[Flying, Bent]:
+    """A flight whose pitching moment is off by a constant, ten deviations of the model's own, and nothing said."""
+    chosen = scenario.load("clear_air", duration=24.0, parameters={"turbulence_sigma_w": 0.0},
+                           effects={"discrepancy": {"Cm_0": 0.02}})  # fmt: skip
+    flight = in_common([reconstruct(fly(chosen, seed=3, observer=False, protection=False).record)])[0]
+    candidates = replace(bank(), families=())
+    evidence = gather(flight, candidates)
+    baseline = Baseline(load(), np.eye(len(candidates.nuisances)))
+    flying = Flying([flight], candidates, [evidence], baseline, 1.0, Courses([evidence], 1.0))
+    nothing = SetFit(misfit=float(evidence.gram[0, 0]))
+    point = flying.settle(nothing, np.zeros(len(candidates.nuisances)))
+    return flying, Bent(point, flying.left_over(nothing, point))
+
+
+def test_no_nuisance_goes_farther_than_it_may(bent):
+    _, flown = bent
+    assert np.max(np.abs(flown.point.nuisances)) <= FARTHEST + 1e-9
+    assert len(flown.point.held) and flown.left.held == tuple(1 + flown.point.held)
+
+
+def test_terms_flown_find_what_there_is_and_let_the_nuisances_go(bent):
+    """Held nuisances take what they can of a moment; flown with its term, they are what they were."""
+    flying, flown = bent
+    rows = [1 + j for j, term in enumerate(flying.candidates.terms) if term.component == "pitching_moment"]
+    there = bring(flying, SetFit(misfit=0.0), flown, rows, np.full(len(rows), 10.0))
+    assert len(there.point.held) == 0 < len(flown.point.held)
+    before, after = (float(one.left.gram[0, 0]) for one in (flown, there))
+    noise = flying.evidences[0].samples
+    assert after < 1.1 * noise < before
+
+
+def test_something_unknown_is_worth_what_it_is_where_it_is_flown(bent):
+    flying, flown = bent
+    terms = tuple(replace(term, row=1 + j) for j, term in enumerate(flying.candidates.terms))
+    found = {u.component: u for u in fit_unknown(flown.left.reduced(), replace(flying.candidates, terms=terms))}
+    linear = found["pitching_moment"]
+    there = flown_unknown(flying, SetFit(misfit=0.0), flown, linear)
+    assert there.log_evidence > linear.log_evidence and there.misfit < linear.misfit
+    path = found.get("elevator_path", replace(linear, component="elevator_path"))
+    assert flown_unknown(flying, SetFit(misfit=0.0), flown, path) is path  # judged on commands alone, exactly linear
