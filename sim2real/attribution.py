@@ -165,15 +165,14 @@ def _merged(fits: list[SetFit], testable: int) -> list[Hypothesis]:
 def _form(reduced: FloatArray, raw: FloatArray, bank: Bank, fit: SetFit) -> Form:
     """A set in another form (see `sim2real.form`), its sizes free to give way."""
     terms, slopes = own_terms(fit.effects, bank.terms), _slopes(fit)
-    first = 1 + len(slopes)
+    first, rows = 1 + len(slopes), [term.row for term in terms]
     chosen = np.zeros((first + len(terms), len(reduced)))
     chosen[0, 0] = 1.0
     for row, weight in (fit.weights or {}).items():
         chosen[0, row] = weight
     for m, slope in enumerate(slopes):
         chosen[1 + m, list(slope)] = list(slope.values())
-    chosen[range(first, len(chosen)), [term.row for term in terms]] = 1.0
-    rows = [term.row for term in terms]
+    chosen[range(first, len(chosen)), rows] = 1.0
     kept = np.diag(reduced)[rows] / np.maximum(np.diag(raw)[rows], 1e-9)
     own = squares(fit, reduced)
     square = room(fit, own, may_bend(own, squares(fit, raw)), terms, kept, float(reduced[0, 0]))

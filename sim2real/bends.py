@@ -37,11 +37,6 @@ def bends(effect: Effect) -> frozenset[tuple[str, str]]:
     return frozenset((component, "*".join([by] * power)) for component, by in pairs for power in powers)
 
 
-def bends_with(effect: Effect, component: str, name: str) -> bool:
-    """Whether a generic term is a power of the regressor of a derivative that an effect changes."""
-    return (component, name) in bends(effect)
-
-
 def _some(parameter: Parameter) -> float:
     """A size that is not neutral."""
     return parameter.typical or 0.5 * (parameter.neutral + max(parameter.low, parameter.high, key=abs))

@@ -34,6 +34,7 @@ def companions(flying: Flying, linear: Posterior, first: SetFit, point: Point) -
     would hide a second one); and what changes a number that went as far as a nuisance may.
     """
     out: dict[str, EffectFit] = {}
+    moving = suspects(flying, linear, point)
     for reduced in flying.beside(first, point, home(first.effects)):
         best: dict[str, EffectFit] = {}
         for family in flying.candidates.families:
@@ -44,7 +45,7 @@ def companions(flying: Flying, linear: Posterior, first: SetFit, point: Point) -
                     best[name] = fit
         promising = sorted(best.values(), key=lambda fit: -fit.log_evidence)[:COMPANIONS]
         out |= {fit.family.effect.name: fit for fit in promising if fit.log_evidence > WORTH}
-        out |= {name: best[name] for name in suspects(flying, linear, point) if name in best}
+        out |= {name: best[name] for name in moving if name in best}
     return list(out.values())
 
 

@@ -19,7 +19,7 @@ from scipy.special import logsumexp
 
 from icing_env import effects
 from icing_env.record import FloatArray
-from sim2real.bends import bends_with
+from sim2real.bends import bends
 from sim2real.generic import UnknownFit
 from sim2real.sets import SetFit
 from sim2real.terms import Term
@@ -177,7 +177,7 @@ def room(fit: SetFit, own: Sequence[float], bending: Sequence[float], terms: Seq
         home = np.array([term.component in _places(family.effect.name) for term in terms])
         if energy > LEAST**2 and home.any():
             out += home * energy / np.count_nonzero(home)
-        bent = np.array([bends_with(family.effect, term.component, term.name) for term in terms])
+        bent = np.array([(term.component, term.name) in bends(family.effect) for term in terms])
         out = np.maximum(out, bent * kept * whole / max(int(np.count_nonzero(bent)), 1))
     return out
 
@@ -231,7 +231,7 @@ def is_own(fit: SetFit, unknown: UnknownFit, nothing: float, raw: FloatArray) ->
 
 def _bent(fit: SetFit, unknown: UnknownFit) -> bool:
     """Whether generic terms are powers of the regressors of derivatives that a set changes, and nothing else."""
-    return all(any(bends_with(family.effect, unknown.component, name) for family in fit.families)
+    return all(any((unknown.component, name) in bends(family.effect) for family in fit.families)
                for name, _, _ in unknown.terms)  # fmt: skip
 
 

@@ -48,10 +48,9 @@ class Point:
 
     def without_held(self) -> Point:
         """The same with these as constants."""
-        at, slope, information = len(self.sizes) + self.held, self.slope.copy(), self.information.copy()
-        slope[at], information[at], information[:, at] = 0.0, 0.0, 0.0
-        information[at, at] = 1.0
-        return replace(self, slope=slope, information=information)
+        at, slope = len(self.sizes) + self.held, self.slope.copy()
+        slope[at] = 0.0
+        return replace(self, slope=slope, information=_holding(at, self.information))
 
 
 @dataclass(frozen=True)
