@@ -133,15 +133,17 @@ def sense(s: Any, m: Any, c: Any, p: Any, felt: tuple, dt: float) -> None:
 
 
 @kernel
-def correct(x: Any, phi: float, left: Any, measured: Any, stretch: Any, gain: Any, change: Any) -> None:
+def correct(x: Any, phi: float, left: Any, measured: Any, stretch: Any, gain: Any, fed: Any, change: Any) -> None:
     """Turn one row's prediction `left` into measured less predicted, and move its states by the gain times that."""
-    change[:] = 0.0
     for c in range(len(left)):
         left[c] = measured[c] - left[c]
-        if c < FED_BACK and np.isfinite(measured[c]):
-            fed = left[c]*stretch[c]
-            for s in range(MOVED + 2):
-                change[s] += gain[c, s]*fed
+    for c in range(len(fed)):
+        fed[c] = left[c]*stretch[c] if np.isfinite(measured[c]) else 0.0
+    for s in range(len(change)):
+        total = 0.0
+        for c in range(len(fed)):
+            total += gain[c, s]*fed[c]
+        change[s] = total
     for s in range(MOVED):
         x[X[s]] += change[s]
     turn(x, phi, change[MOVED], change[MOVED + 1])
@@ -195,7 +197,8 @@ def along(table: Any, controls: Any, first: Any, measured: Any, stretch: Any, ga
     p, u = matrix(table, 3, _N_PARAMETERS, NUMBER), matrix(table, 4, _N_COMMAND, NUMBER)
     held = matrix(table, 2, _N_CURRENT, NUMBER)
     clock = rows(table, 6, CLOCK)[0]
-    block, change, speeds = np.zeros(ROWS*LANES), np.zeros(MOVED + 2), np.zeros(len(x))
+    block, speeds = np.zeros(ROWS*LANES), np.zeros(len(x))
+    fed, change = np.zeros(FED_BACK), np.zeros(MOVED + 2)
     for i in range(len(x)):
         speeds[i] = outcomes[i].airspeed
     for at in range(0, len(x), LANES):
@@ -226,7 +229,7 @@ def along(table: Any, controls: Any, first: Any, measured: Any, stretch: Any, ga
                     out[k, error_at[j, 0], error_at[j, 1]] += error[j, k + 1]
             for i in range(at, at + count if len(gain) > 0 else at):
                 own = gain[i if len(gain) > 1 else 0, min(k, gain.shape[1] - 1)]
-                correct(x[i], y[i, _PHI], out[k, i], measured[k + 1], stretch, own, change)
+                correct(x[i], y[i, _PHI], out[k, i], measured[k + 1], stretch, own, fed, change)
             for j in range(len(force)):
                 if at <= force_at[j, 0] < at + count:
                     x[force_at[j, 0], force_at[j, 1]] += force[j, k + 1]

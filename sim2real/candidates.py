@@ -82,6 +82,11 @@ class Bank:
     size: int
     excluded: Mapping[str, str] = field(default_factory=dict)  # effect: why it is not tried
 
+    @property
+    def linear(self) -> tuple[int, ...]:
+        """Rows whose signatures are taken as linear: nuisances, then generic terms."""
+        return (*range(1, 1 + len(self.nuisances)), *(term.row for term in self.terms))
+
 
 def nuisances() -> tuple[Nuisance, ...]:
     """Derivatives by `SPREAD`, mass, the vanes' scales, the timing of channels, guessed thrust."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from icing_env.record import FloatArray
-from sim2real.evidence import Evidence, compare, predicted
+from sim2real.evidence import Evidence, flown, predicted
 from sim2real.paths import PATHS
 from sim2real.predictor import Push, innovations
 from sim2real.terms import Term, at_any_time, pushes
@@ -85,8 +85,8 @@ class Courses:
     def of_terms(self, terms: Sequence[Term]) -> list[tuple[FloatArray, FloatArray]]:
         """What generic terms make of every record [N x channels, terms], and its inner products; always the same."""
         if not self._terms:
-            moved = [replace(term, row=1 + j) for j, term in enumerate(terms)]
-            self._terms = [(rows, rows.T @ rows) for rows in (_flown(e, moved) for e in self.evidences)]
+            own = [e.rows[:, e.rows.shape[1] - len(terms) :] for e in self.evidences]
+            self._terms = [(rows, rows.T @ rows) for rows in own]
         return self._terms
 
     def at(self, components: Collection[str]) -> list[Freed]:
@@ -121,8 +121,8 @@ class Courses:
 def _flown(evidence: Evidence, terms: Sequence[Term]) -> FloatArray:
     """What terms make of one record, flown about the model [N x channels, terms]."""
     rows = np.repeat(evidence.flight.parameters, 1 + len(terms))
-    return compare(evidence.flight, rows, _pushes(evidence, terms), evidence.gain, evidence.factor,
-                   keep=range(1, len(rows))).rows
+    return flown(evidence.flight, rows, _pushes(evidence, terms), evidence.gain, evidence.factor,
+                 keep=range(1, len(rows))).rows
 
 
 def _pushes(evidence: Evidence, terms: Sequence[Term]) -> tuple[Push, ...]:

@@ -41,7 +41,7 @@ class Evidence:
         factor: whitens innovations [steps, channels, channels].
         samples: whitened numbers behind the inner products.
         whitened: [N, channels of MEASURED], v itself, for showing where the gap lies.
-        rows: [N x channels, rows] what is behind `gram` but for the paths, if it was kept; else empty.
+        rows: [N x channels, kept] what is behind `gram` but for the paths, of the rows that were kept.
     """
 
     gram: FloatArray
@@ -59,7 +59,7 @@ class Evidence:
 
 
 def gather(flight: Reconstruction, bank: Bank, gain: Gain | None = None) -> Evidence:
-    """Fly every candidate along one record.
+    """Fly every candidate along one record; the rows of `bank.linear` are kept themselves.
 
     Args:
         gain: of the predictor; the likeliest of SIGMAS if omitted.
@@ -69,7 +69,7 @@ def gather(flight: Reconstruction, bank: Bank, gain: Gain | None = None) -> Evid
     base = innovations(flight, flight.parameters, gain.K)[:, 0]
     factor = whitening(base, gain, flight)
     pushed = pushes(replace(flight, measured=predicted(flight, base)), bank.terms)
-    return compare(flight, parameter_rows(flight, bank), pushed, gain, factor, bank.terms)
+    return compare(flight, parameter_rows(flight, bank), pushed, gain, factor, bank.terms, bank.linear)
 
 
 def compare(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain: Gain,
@@ -80,27 +80,32 @@ def compare(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gai
         terms: generic ones, of which those of a path are judged there.
         keep: rows that are wanted themselves.
     """
+    found, first = flown(flight, rows, pushed, gain, factor, keep), round(SETTLE / flight.dt)
+    samples = counted(flight, len(flight.time) - first) * len(path_residuals(flight, rows[:1]))
+    return replace(found, gram=found.gram + path_gram(flight, rows, terms, first), samples=found.samples + samples)
+
+
+def flown(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain: Gain, factor: FloatArray,
+          keep: Sequence[int] = ()) -> Evidence:
+    """The same but for the paths, which do not care how the aircraft flies."""
     moved = flown_rows(flight, rows, {q.row for q in pushed})
     index = {row: i for i, row in enumerate(moved)}
     renamed = tuple(replace(q, row=index[q.row]) for q in pushed)
     left = innovations(flight, rows[moved], gain.K, renamed)
     first = round(SETTLE / flight.dt)
-    flown, samples = np.zeros((len(moved), len(moved))), 0
+    inner, samples = np.zeros((len(moved), len(moved))), 0
     whitened = np.zeros((len(left), len(MEASURED)))
     kept = np.zeros(((len(left) - first) * len(MEASURED), len(keep)))
-    at = [(i, index[row]) for i, row in enumerate(keep) if row in index]
+    at = np.array([(i, index[row]) for i, row in enumerate(keep) if row in index], np.intp).reshape(-1, 2)
     for k in range(first, len(left), CHUNK):
         flat = np.empty((len(left[k : k + CHUNK]) * len(MEASURED), len(moved)))
         _departures(left[k : k + CHUNK], factor[k : k + CHUNK], FARTHEST, flat)
         whitened[k : k + CHUNK] = flat[:, 0].reshape(-1, len(MEASURED))
         samples += int(np.count_nonzero(flat[:, 0]))
-        for i, j in at:
-            kept[(k - first) * len(MEASURED) :][: len(flat), i] = flat[:, j]
-        flown += flat.T @ flat
+        kept[(k - first) * len(MEASURED) :][: len(flat), at[:, 0]] = flat[:, at[:, 1]]
+        inner += flat.T @ flat
     gram = np.zeros((len(rows), len(rows)))
-    gram[np.ix_(moved, moved)] = flown
-    gram += path_gram(flight, rows, terms, first)
-    samples += sum(counted(flight, len(flight.time) - first) for _ in path_residuals(flight, rows[:1]))
+    gram[np.ix_(moved, moved)] = inner
     return Evidence(gram, gain, factor, samples, whitened, flight, kept)
 
 
@@ -178,15 +183,23 @@ def _departures(left: Any, factor: Any, farthest: float, out: Any) -> None:
         out: [N x channels, rows].
     """
     steps, count, channels = left.shape
+    known = np.empty((channels, count))
     for k in range(steps):
         for i in range(count):
             for c in range(channels):
-                total = 0.0
-                for d in range(c + 1):
-                    if np.isfinite(left[k, i, d]):
-                        total += factor[k, c, d]*left[k, i, d]
-                total = min(max(total, -farthest), farthest)
-                out[k*channels + c, i] = total if i == 0 else total - out[k*channels + c, 0]
+                known[c, i] = left[k, i, c] if np.isfinite(left[k, i, c]) else 0.0
+        for c in range(channels):
+            row = out[k*channels + c]
+            row[:] = 0.0
+            for d in range(c + 1):
+                share = factor[k, c, d]
+                if share != 0.0:
+                    for i in range(count):
+                        row[i] += share*known[d, i]
+            for i in range(count):
+                row[i] = min(max(row[i], -farthest), farthest)
+            for i in range(1, count):
+                row[i] -= row[0]
 
 
 def _spread(values: NDArray[np.floating]) -> float:

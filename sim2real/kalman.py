@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from icing_env.jit import entry
 from icing_env.record import FloatArray
 from icing_env.turbulence import pair_noise, scales
 from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR, SURFACES
@@ -173,13 +175,23 @@ def _recursion(A: FloatArray, C: FloatArray, Q: FloatArray, R: FloatArray, cross
                steps: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Gains [steps, states, channels] and innovation covariances from the states' covariance `P`, and P after them."""
     K, covariance = np.empty((steps, len(A), len(C))), np.empty((steps, len(C), len(C)))
-    for k in range(steps):
-        PC = P @ C.T
-        covariance[k] = C @ PC + R
-        K[k] = np.linalg.solve(covariance[k], (A @ PC + cross).T).T
-        P = A @ P @ A.T - K[k] @ covariance[k] @ K[k].T + Q
-        P = 0.5 * (P + P.T)
-    return K, covariance, P
+    after = P.copy()
+    _recurse(np.ascontiguousarray(A), np.ascontiguousarray(C), Q, R, np.ascontiguousarray(cross), after, K, covariance)
+    return K, covariance, after
+
+
+@entry
+def _recurse(A: Any, C: Any, Q: Any, R: Any, cross: Any, P: Any, K: Any, covariance: Any) -> None:
+    """Riccati's recursion, step by step; P is changed in place."""
+    At, Ct = np.ascontiguousarray(A.T), np.ascontiguousarray(C.T)
+    for k in range(len(K)):
+        PC = np.dot(P, Ct)
+        covariance[k] = np.dot(C, PC) + R
+        onto = np.dot(A, PC) + cross
+        gain = np.ascontiguousarray(np.linalg.solve(covariance[k], np.ascontiguousarray(onto.T)).T)
+        K[k] = gain
+        after = np.dot(np.dot(A, P), At) - np.dot(gain, np.ascontiguousarray(onto.T)) + Q
+        P[:] = 0.5*(after + after.T)
 
 
 def _start_covariance(sigma: float) -> FloatArray:

@@ -36,8 +36,8 @@ STILL_COMMAND, STILL_LEVER = 1e-4, 1e-3  # rad, 0..1: a command that moves less 
 
 
 def path_residuals(flight: Reconstruction, parameters: NDArray,
-                   terms: Sequence[Term] = ()) -> list[tuple[FloatArray, list[int]]]:
-    """For every path with a recorded command: (measured - predicted)/noise [N, rows], and which rows of `parameters`.
+                   terms: Sequence[Term] = ()) -> list[tuple[str, FloatArray, list[int]]]:
+    """Every path with a recorded command, (measured - predicted)/noise [N, rows], and which rows of `parameters`.
 
     Rows that differ from the first in nothing that the path knows are left out; generic terms add to its prediction.
     Zero where the position was not recorded.
@@ -58,7 +58,7 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
             noise = np.hypot(max(POSITION_NOISE, spread(measured)), TIMING * np.gradient(whole, flight.dt))
             noise *= _weight(flight)
             left = (measured[:, None] - np.column_stack([predicted, *added])) / noise[:, None]
-            out.append((np.where(good[:, None], left, 0.0), rows + [term.row for term in own]))
+            out.append((f"{surface}_path", np.where(good[:, None], left, 0.0), rows + [term.row for term in own]))
     return out + _engine_residuals(flight, parameters)
 
 
@@ -71,21 +71,23 @@ def of_paths(flight: Reconstruction, components: Collection[str]) -> Reconstruct
 def path_gram(flight: Reconstruction, parameters: NDArray, terms: Sequence[Term] = (), first: int = 0) -> FloatArray:
     """Inner products [rows, rows] of `path_residuals` from sample `first` on; rows but the first as departures."""
     gram = np.zeros((len(parameters), len(parameters)))
-    for path, own in path_residuals(flight, parameters, terms):
+    for _, path, own in path_residuals(flight, parameters, terms):
         path = path[first:].copy()
         path[:, 1:] -= path[:, :1]
         gram[np.ix_(own, own)] += path.T @ path
     return gram
 
 
-def excess(flight: Reconstruction, parameters: NDArray, component: str) -> float:
-    """Whitened square above noise that the paths of a component leave: as much as any course of it would take.
+def excess(flight: Reconstruction, parameters: NDArray) -> dict[str, float]:
+    """Whitened square above noise that the paths of each component leave: as much as any course of it would take.
 
     Args:
         parameters: one PARAMETERS row.
     """
-    return sum(float(np.sum(residual[:, 0] ** 2)) - counted(flight, len(residual))
-               for residual, _ in path_residuals(of_paths(flight, (component,)), parameters))
+    out = dict.fromkeys(PATHS, 0.0)
+    for component, residual, _ in path_residuals(flight, parameters):
+        out[component] += float(np.sum(residual[:, 0] ** 2)) - counted(flight, len(residual))
+    return out
 
 
 def counted(flight: Reconstruction, samples: int) -> int:
@@ -117,7 +119,7 @@ def _at_any_lag(flights: Sequence[Reconstruction]) -> FloatArray:
             rows = np.repeat(flight.parameters, len(LAGS))
             rows[f"{surface}_lag"] = np.maximum(rows[f"{surface}_lag"] + LAGS, 0.0)
             only = replace(flight, commands={n: c for n, c in flight.commands.items() if n == f"{surface}_command"})
-            for residual, own in path_residuals(only, rows):
+            for _, residual, own in path_residuals(only, rows):
                 square = np.full(len(LAGS), np.sum(residual[:, 0] ** 2))
                 square[own] = np.sum(residual**2, axis=0)
                 left += square
@@ -183,7 +185,7 @@ def driven(flight: Reconstruction, parameters: NDArray, paths: Collection[str]) 
     return replace(flight, controls=controls)
 
 
-def _engine_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple[FloatArray, list[int]]]:
+def _engine_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple[str, FloatArray, list[int]]]:
     if flight.power_from != "torque":
         return []
     out = []
@@ -202,7 +204,7 @@ def _engine_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple
             found[1:, j] = lfilter([s], [1.0, s - 1.0], wanted[1:], zi=[(1.0 - s) * power[j]])[0]
         left = (flight.controls[f"power_{side}"][:, None] - found) / full[:, None]
         # the chart between lever and power is nobody's claim: a constant share and an offset are taken out
-        out.append((_without_line(left, lever) / (POWER_NOISE * _weight(flight)), rows))
+        out.append(("propulsion", _without_line(left, lever) / (POWER_NOISE * _weight(flight)), rows))
     return out
 
 

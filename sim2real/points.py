@@ -14,14 +14,15 @@ from icing_env.record import FloatArray
 from sim2real.attribution import reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, parameter_rows
 from sim2real.courses import Courses, Remainder
-from sim2real.evidence import SETTLE, Evidence, compare
+from sim2real.evidence import SETTLE, Evidence, compare, flown
 from sim2real.paths import PATHS, excess, of_paths, path_gram
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.sets import SetFit
 
-ROUNDS = 6
+ROUNDS, TURNS = 6, 3  # steps with the same slopes by nuisances, and how often these are flown anew
 SETTLED = 0.2  # gain of half the whitened square that is worth another round
+NEAR = 5.0  # such a gain, of a point so near that its slopes will do
 FAR = 1000.0  # whitened square above the linear fit's that makes another start worth a flight
 FARTHEST = 5.0  # standard deviations of a nuisance: what is beyond is no nuisance but a gap
 
@@ -31,7 +32,9 @@ class Point:
     """A set at given sizes [k] and nuisances [n], flown.
 
     cost: half the whitened square it leaves, the nuisances' prior included, tempered; slope and information: of sizes
-    (in ranges of their parameters), then nuisances; weights: of the generic terms flown with it, by row of the bank.
+    (in ranges of their parameters), then nuisances; weights: of the generic terms flown with it, by row of the bank;
+    rows: what it leaves of every record, then what a step of each size and nuisance makes of that, but for the paths
+    [N x channels, 1 + k + n].
     """
 
     sizes: FloatArray
@@ -40,6 +43,7 @@ class Point:
     slope: FloatArray
     information: FloatArray
     weights: Mapping[int, float] = field(default_factory=dict)
+    rows: Sequence[FloatArray] = ()
 
     @property
     def held(self) -> NDArray[np.intp]:
@@ -69,27 +73,55 @@ class Flying:
 
         Where that is far worse than the linear fit had it, from the published model if that is nearer.
         """
-        at, span = np.array(fit.estimate), _ranges(fit)
-        best, share = self.point(fit, at, np.clip(start, -FARTHEST, FARTHEST)), 1.0
+        at, near = np.array(fit.estimate), self._near()
+        best = self.point(fit, at, np.clip(start, -FARTHEST, FARTHEST), near)
         if 2.0 * best.cost > fit.misfit + FAR:
-            best = min(best, self.point(fit, at, np.zeros_like(start)), key=lambda point: point.cost)
-        for _ in range(ROUNDS):
-            step = share * bounded_step(best.information, best.slope, *rooms(fit, best, span))
-            if -float(step @ best.slope) - 0.5 * float(step @ best.information @ step) < SETTLED:
+            best = min(best, self.point(fit, at, np.zeros_like(start), near), key=lambda point: point.cost)
+        best = self._descended(fit, best)
+        for _ in range(TURNS):
+            best = self.point(fit, best.sizes, best.nuisances)
+            promised = _promised(best, self._step(fit, best))
+            best = self._descended(fit, best)
+            if promised < NEAR:
                 break
-            k = len(span)
-            tried = self.point(fit, best.sizes + step[:k] * span, best.nuisances + step[k:])
-            best, share = (tried, 1.0) if tried.cost < best.cost else (best, 0.5 * share)
         return best.without_held()
 
-    def point(self, fit: SetFit, sizes: FloatArray, nuisances: FloatArray) -> Point:
-        """A set flown at given sizes [k] and nuisances [n]."""
+    def _near(self) -> list[FloatArray]:
+        """Slopes by nuisances [N x channels, n] of every record, where the variants were flown."""
+        return [e.rows[:, : len(self.candidates.nuisances)] for e in self.evidences]
+
+    def _step(self, fit: SetFit, point: Point) -> FloatArray:
+        return bounded_step(point.information, point.slope, *rooms(fit, point, _ranges(fit)))
+
+    def _descended(self, fit: SetFit, best: Point) -> Point:
+        """The best that is reached with the slopes by nuisances as they are: two to four rows a flight."""
+        share, span = 1.0, _ranges(fit)
+        k = len(span)
+        slopes = [rows[:, 1 + k :] for rows in best.rows]
+        for _ in range(ROUNDS):
+            step = share * self._step(fit, best)
+            if _promised(best, step) < SETTLED:
+                break
+            tried = self.point(fit, best.sizes + step[:k] * span, best.nuisances + step[k:], slopes)
+            best, share = (tried, 1.0) if tried.cost < best.cost else (best, 0.5 * share)
+        return best
+
+    def point(self, fit: SetFit, sizes: FloatArray, nuisances: FloatArray, slopes: Sequence[FloatArray] = ()) -> Point:
+        """A set flown at given sizes [k] and nuisances [n].
+
+        Args:
+            slopes: of every record by nuisances [N x channels, n], where others will do; flown if omitted.
+        """
         k, n = len(sizes), len(nuisances)
         steps = size_steps(fit, sizes)
-        gram = np.zeros((1 + k + n, 1 + k + n))
-        for flight, evidence in zip(self.flights, self.evidences, strict=True):
+        gram, kept = np.zeros((1 + k + n, 1 + k + n)), []
+        for i, (flight, evidence) in enumerate(zip(self.flights, self.evidences, strict=True)):
             rows = _rows(flight, self.candidates, fit, sizes, steps, nuisances)
-            gram += compare(flight, rows, (), evidence.gain, evidence.factor).gram / self.tempering
+            moved = rows[: 1 + k] if slopes else rows
+            own = flown(flight, moved, (), evidence.gain, evidence.factor, keep=range(len(moved))).rows
+            own = np.column_stack([own, slopes[i]]) if slopes else own
+            gram += (own.T @ own + path_gram(flight, rows, (), round(SETTLE / flight.dt))) / self.tempering
+            kept.append(own)
         span = _ranges(fit)
         unit = np.concatenate([[1.0], span / steps if k else [], np.full(n, 1.0 / NUISANCE_STEP)])
         gram = gram * unit[:, None] * unit
@@ -99,24 +131,29 @@ class Flying:
         information[k:, k:] += prior
         information[:k, :k] += np.eye(k)  # a size moves no farther than its range
         cost = 0.5 * (gram[0, 0] + nuisances @ prior @ nuisances)
-        return Point(sizes, nuisances, float(cost), slope, information)
+        return Point(sizes, nuisances, float(cost), slope, information, rows=kept)
 
-    def left_over(self, fit: SetFit, point: Point) -> Remainder:
+    def left_over(self, fit: SetFit, point: Point, anew: bool = False) -> Remainder:
         """What a set leaves where it was flown, everything in it free to give way.
 
-        What generic terms would make of the records is taken from flights about the model.
+        What generic terms would make of the records is taken from flights about the model. With weights the point's
+        rows are flown again, the slopes by nuisances only if these are to be `anew`.
         """
         terms, k, n = self.candidates.terms, len(point.sizes), len(point.nuisances)
         first, steps = 1 + k + n, size_steps(fit, point.sizes)
         moved = tuple(replace(term, row=first + j) for j, term in enumerate(terms))
         gram, kept, left_in = np.zeros((first + len(terms),) * 2), [], dict.fromkeys(PATHS, 0.0)
-        pushed = self.courses.pushed(terms, point.weights, first)
-        for flight, evidence, (generic, inner), pushes in zip(
-                self.flights, self.evidences, self.courses.of_terms(terms), pushed, strict=True):
+        again = first if anew else 1 + k
+        pushed = self.courses.pushed(terms, point.weights, again)
+        for i, (flight, evidence, (generic, inner), pushes) in enumerate(zip(
+                self.flights, self.evidences, self.courses.of_terms(terms), pushed, strict=True)):
             rows = _rows(flight, self.candidates, fit, point.sizes, steps, point.nuisances)
-            for component in PATHS:
-                left_in[component] += excess(flight, rows[:1], component) / self.tempering
-            own = compare(flight, rows, pushes, evidence.gain, evidence.factor, keep=range(first)).rows
+            for component, over in excess(flight, rows[:1]).items():
+                left_in[component] += over / self.tempering
+            own = point.rows[i]
+            if point.weights:
+                found = flown(flight, rows[:again], pushes, evidence.gain, evidence.factor, keep=range(again))
+                own = np.column_stack([found.rows, own[:, again:]])
             across = own.T @ generic
             rows = np.concatenate([rows, np.repeat(rows[:1], len(terms))])
             gram += (np.block([[own.T @ own, across], [across.T, inner]])
@@ -178,6 +215,11 @@ def bounded_step(information: FloatArray, slope: FloatArray, low: FloatArray, hi
         return np.asarray(step)
     root = np.linalg.cholesky(information)
     return np.asarray(lsq_linear(root.T, -np.linalg.solve(root, slope), (low - 1e-12, high + 1e-12), method="bvls").x)
+
+
+def _promised(point: Point, step: FloatArray) -> float:
+    """By how much a step would lower half the whitened square."""
+    return -float(step @ point.slope) - 0.5 * float(step @ point.information @ step)
 
 
 def size_steps(fit: SetFit, sizes: FloatArray) -> FloatArray:

@@ -57,6 +57,7 @@ from sim2real.terms import Term
 
 MOST = 9  # explanations flown again; what looks better then and has not been flown is not believed
 PART = 0.1  # of what a set is more probable than nothing (in logarithms), that an effect flown for its sake is alone
+TAKEN = 10.0  # whitened square above luck, that generic terms take of what leaves room for a companion (assumed)
 FEW_PLACES = 5  # components at which courses of time are freed together
 
 
@@ -150,7 +151,8 @@ class _Search:
         # by slope or bank, the less: polynomials bend between sizes, and slopes are not those of smaller ones
         flown = flown_squares(h.fit, Bent(self.points[i], self.left[i]))
         reduced = squares(h.fit, self.linear.reduced)
-        bending = may_bend(list(map(min, flown[0], reduced)), list(map(min, flown[1], squares(h.fit, raw))))
+        beyond = energies(list(map(min, flown[0], reduced)), self.nothing - h.fit.misfit)
+        bending = may_bend(beyond, list(map(min, flown[1], squares(h.fit, raw))))
         return rows, room(h.fit, reduced, bending, own, kept, self.nothing)
 
     def _free(self, fit: SetFit, left: Remainder, beside: UnknownFit | None = None) -> tuple[Liberty, ...]:
@@ -199,7 +201,9 @@ class _Search:
         """Pairs of the best single effect, where it was flown, with what may stand beside it."""
         if not (alone := self._ranked(1)):
             return []
-        first = self.found[alone[0]]
+        first, left = self.found[alone[0]], float(self.left[alone[0]].reduced()[0, 0])
+        if not any(left - u.left > TAKEN for u in self.generic[alone[0]]) and not len(self.points[alone[0]].held):
+            return []
         return [self._propose(together(first.fit, fit))
                 for fit in companions(self.flying, self.linear, first.fit, self.points[alone[0]])]  # fmt: skip
 

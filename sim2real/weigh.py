@@ -77,10 +77,10 @@ class _Weighing:
         self.known: list[Gain] | None = None
         self.quiet = dict(untestable)
 
-    def gather(self, known: Sequence[Gain] | None) -> None:
-        """Fly the variants about the centre, with gains where known, and weigh what they say."""
+    def gather(self, known: Sequence[Gain] | None, tempering: float | None = None) -> None:
+        """Fly the variants about the centre, with gains (and tempering) where known, and weigh what they say."""
         self.evidences = gather_about(self.flights, self.candidates, self.centre, known)
-        self._weigh(None)
+        self._weigh(tempering)
 
     def _weigh(self, tempering: float | None) -> None:
         self.quiet = dict(self.untestable)
@@ -133,8 +133,9 @@ class _Weighing:
         if not other and calm >= CALMER * self.posterior.tempering:
             return False
         if other:
-            self.evidences = gather_about(self.flights, self.candidates, self.centre, self.known)
-        self._weigh(calm)
+            self.gather(self.known, calm)
+        else:
+            self._weigh(calm)
         return True
 
 

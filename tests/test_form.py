@@ -20,8 +20,9 @@ from sim2real.form import (
     Liberty,
     forgiven,
     own_terms,
+    with_terms,
 )
-from sim2real.generic import fit_unknown
+from sim2real.generic import UnknownFit, fit_unknown
 from sim2real.home_terms import gain, without
 from sim2real.home_terms import given as after_terms
 from sim2real.hypotheses import set_prior, within
@@ -118,6 +119,16 @@ def test_terms_given_their_room_take_what_the_evidence_says_they_take() -> None:
     form = gain(gram[1:, 1:], gram[1:, 0], square, 20.0**2)
     assert 0.0 < after[0, 0] < 0.2 * gram[0, 0]
     assert form.left[2] <= after[0, 0] + TERMS  # the evidence's own square has its prior's share beside it, luck apart
+
+
+def test_each_way_is_judged_by_what_was_free_where_it_was_flown() -> None:
+    """Two members have two shares, of one more way beside them nothing is flown."""
+    strict, easy = (Liberty(beyond=beyond) for beyond in (400.0, 0.0))
+    own = UnknownFit("z_force", 0.0, (), 300.0, {})
+    form = with_terms(Form((0.0,) * 3, (300.0,) * 3, (strict,), bent=(easy,)), own)
+    assert form is not None
+    ways = [form.way(k, 1e4, 0.0, 0.0) - form.gained[k] for k in range(4)]
+    assert ways[0] == ways[3] < ways[1] == ways[2]
 
 
 def test_sizes_give_way_before_a_form_is_judged() -> None:

@@ -86,4 +86,4 @@ def test_a_short_record_and_a_blank_position_are_no_trouble(flight):
     assert len(placed(short).controls["elevator"]) in (n, len(made.time))
     blank = replace(made, positions=made.positions | {"elevator": np.full(len(made.time), np.nan)})
     assert placed(blank).surface_noise[0] == SURFACE_NOISE
-    assert all(np.isfinite(left).all() for left, _ in path_residuals(blank, blank.parameters))
+    assert all(np.isfinite(left).all() for _, left, _ in path_residuals(blank, blank.parameters))

@@ -141,7 +141,7 @@ def _averaged(values: FloatArray, at: NDArray[np.intp], half: int) -> FloatArray
 
 def _paths(flight: Reconstruction, rows: NDArray) -> dict[str, FloatArray]:
     found = {}
-    for k, (left, own) in enumerate(path_residuals(flight, rows)):
+    for k, (_, left, own) in enumerate(path_residuals(flight, rows)):
         table = np.zeros((len(rows), len(left)))
         table[0] = left[:, 0]
         for i, row in enumerate(own[1:], start=1):

@@ -1,0 +1,70 @@
+"""A set flown along records: slopes taken from elsewhere save flights and change nothing that is found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from icing_env import scenario
+from icing_env.aircraft import load
+from sim2real.candidates import bank
+from sim2real.courses import Courses
+from sim2real.evidence import flown, gather, innovations, predicted
+from sim2real.points import Flying, bounded_step, rooms
+from sim2real.reconstruct import reconstruct
+from sim2real.references import Baseline
+from sim2real.sets import SetFit
+from sim2real.terms import in_common, pushes
+from testbed.flight import fly
+
+NOTHING = SetFit(misfit=1e6)
+
+
+@pytest.fixture(scope="module")
+def flying() -> Flying:
+    """A flight in gusts whose weathercock moment is weaker than published, by four deviations of the model's own."""
+    chosen = scenario.load("clear_air", duration=24.0, parameters={"turbulence_sigma_w": 0.5},
+                           effects={"directional_stability": {"change": -0.2}})  # fmt: skip
+    flight = in_common([reconstruct(fly(chosen, seed=5, observer=False, protection=False).record)])[0]
+    candidates = replace(bank(), families=())
+    evidence = gather(flight, candidates)
+    baseline = Baseline(load(), np.eye(len(candidates.nuisances)))
+    return Flying([flight], candidates, [evidence], baseline, 1.0, Courses([evidence], 1.0))
+
+
+def test_what_was_kept_of_the_terms_is_what_they_make_when_flown(flying):
+    (evidence,), terms = flying.evidences, flying.candidates.terms
+    base = innovations(evidence.flight, evidence.flight.parameters, evidence.gain.K)[:, 0]
+    pushed = pushes(replace(evidence.flight, measured=predicted(evidence.flight, base)),
+                    [replace(term, row=1 + j) for j, term in enumerate(terms)])
+    again = flown(evidence.flight, np.repeat(evidence.flight.parameters, 1 + len(terms)), pushed, evidence.gain,
+                  evidence.factor, keep=range(1, 1 + len(terms))).rows  # fmt: skip
+    (kept, inner), = flying.courses.of_terms(terms)
+    assert np.max(np.abs(again)) > 1.0
+    assert kept == pytest.approx(again, abs=1e-9)
+    assert inner == pytest.approx(again.T @ again, rel=1e-9, abs=1e-6)
+
+
+def test_a_point_with_slopes_from_elsewhere_costs_what_it_does_with_its_own(flying):
+    away = 0.5 * np.random.default_rng(0).standard_normal(len(flying.candidates.nuisances))
+    own = flying.point(NOTHING, np.zeros(0), away)
+    lent = flying.point(NOTHING, np.zeros(0), away, flying._near())
+    assert lent.cost == pytest.approx(own.cost, rel=1e-12)
+    assert lent.rows[0][:, 0] == pytest.approx(own.rows[0][:, 0], abs=1e-12)
+
+
+def test_it_settles_where_full_steps_of_gauss_and_newton_do(flying):
+    start = np.zeros(len(flying.candidates.nuisances))
+    best = flying.point(NOTHING, np.zeros(0), start)
+    first = best.cost
+    for _ in range(6):
+        step = bounded_step(best.information, best.slope, *rooms(NOTHING, best, np.zeros(0)))
+        tried = flying.point(NOTHING, np.zeros(0), best.nuisances + step)
+        if tried.cost >= best.cost:
+            break
+        best = tried
+    settled = flying.settle(NOTHING, start)
+    assert best.cost < first - 20.0
+    assert settled.cost < best.cost + 0.2
