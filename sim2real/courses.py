@@ -28,14 +28,14 @@ class Remainder:
     Attributes:
         gram: inner products of what is left (row 0), the set's sizes, nuisances, and (from `first` on) generic terms.
         first: the first of these.
-        rows: those before it, of every record [N x channels, first], but for the paths.
+        rows: those before it, of every record, in parts side by side [N x channels, first], but for the paths.
         excess: whitened square above noise that is left in paths, by component.
         held: nuisances (by row) that are as far as they may be, and give way no more.
     """
 
     gram: FloatArray
     first: int
-    rows: list[FloatArray]
+    rows: Sequence[Sequence[FloatArray]]
     excess: dict[str, float]
     held: tuple[int, ...] = ()
 
@@ -58,9 +58,9 @@ class Freed:
     inverse: FloatArray
     chance: float
 
-    def taken(self, rows: FloatArray, tempering: float) -> FloatArray:
-        """What they explain of the inner products (tempered) of other rows [rows, rows]."""
-        cross = self.rows.T @ rows / tempering
+    def taken(self, parts: Sequence[FloatArray], tempering: float) -> FloatArray:
+        """What they explain of the inner products (tempered) of other rows, in parts side by side [rows, rows]."""
+        cross = np.concatenate([self.rows.T @ rows for rows in parts], axis=1) / tempering
         return np.asarray(cross.T @ self.inverse @ cross)
 
 

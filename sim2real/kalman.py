@@ -112,9 +112,10 @@ def follow(flight: Reconstruction, gain: Gain) -> Gain:
     for span, A, C, B in zip(spans, *linearise(flight, spans), strict=True):
         model = _noisy(flight, A, C, B, Qw, noise)
         here, covariance, P = _recursion(*model, P, min(each, steps - span.start))
-        K.append(here)
+        K.append(np.swapaxes(here, 1, 2))
         S.append(covariance)
-    return replace(gain, K=np.concatenate(K), S=np.concatenate(S))
+    by_channel = np.ascontiguousarray(np.concatenate(K))  # in memory as the loop of the predictor reads them
+    return replace(gain, K=np.swapaxes(by_channel, 1, 2), S=np.concatenate(S))
 
 
 def _gusts(flight: Reconstruction, sigma: float) -> tuple[FloatArray, list[int]]:

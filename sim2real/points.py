@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,13 +29,39 @@ FARTHEST = 5.0  # standard deviations of a nuisance: what is beyond is no nuisan
 
 
 @dataclass(frozen=True)
+class Slopes:
+    """What a step of each nuisance makes of one record [N x channels, n], and of generic terms [N x channels, terms].
+
+    Lent from point to point; their inner products are taken once.
+    """
+
+    rows: FloatArray
+    terms: FloatArray
+
+    @cached_property
+    def inner(self) -> FloatArray:
+        """Inner products [n, n]."""
+        return np.asarray(self.rows.T @ self.rows)
+
+    @cached_property
+    def onto(self) -> FloatArray:
+        """Inner products with the terms [n, terms]."""
+        return np.asarray(self.rows.T @ self.terms)
+
+    def beside(self, rows: FloatArray) -> FloatArray:
+        """Inner products of other rows [N x channels, m], then these."""
+        across = rows.T @ self.rows
+        return np.block([[rows.T @ rows, across], [across.T, self.inner]])
+
+
+@dataclass(frozen=True)
 class Point:
     """A set at given sizes [k] and nuisances [n], flown.
 
     cost: half the whitened square it leaves, the nuisances' prior included, tempered; slope and information: of sizes
     (in ranges of their parameters), then nuisances; weights: of the generic terms flown with it, by row of the bank;
-    rows: what it leaves of every record, then what a step of each size and nuisance makes of that, but for the paths
-    [N x channels, 1 + k + n].
+    rows: what it leaves of every record, then what a step of each size makes of that, but for the paths
+    [N x channels, 1 + k]; slopes: the same of each nuisance.
     """
 
     sizes: FloatArray
@@ -44,6 +71,7 @@ class Point:
     information: FloatArray
     weights: Mapping[int, float] = field(default_factory=dict)
     rows: Sequence[FloatArray] = ()
+    slopes: Sequence[Slopes] = ()
 
     @property
     def held(self) -> NDArray[np.intp]:
@@ -73,7 +101,7 @@ class Flying:
 
         Where that is far worse than the linear fit had it, from the published model if that is nearer.
         """
-        at, near = np.array(fit.estimate), self._near()
+        at, near = np.array(fit.estimate), self.near
         best = self.point(fit, at, np.clip(start, -FARTHEST, FARTHEST), near)
         if 2.0 * best.cost > fit.misfit + FAR:
             best = min(best, self.point(fit, at, np.zeros_like(start), near), key=lambda point: point.cost)
@@ -86,9 +114,14 @@ class Flying:
                 break
         return best.without_held()
 
-    def _near(self) -> list[FloatArray]:
-        """Slopes by nuisances [N x channels, n] of every record, where the variants were flown."""
-        return [e.rows[:, : len(self.candidates.nuisances)] for e in self.evidences]
+    @cached_property
+    def near(self) -> list[Slopes]:
+        """Slopes by nuisances where the variants were flown."""
+        return self._slopes([e.rows[:, : len(self.candidates.nuisances)] for e in self.evidences])
+
+    def _slopes(self, rows: Sequence[FloatArray]) -> list[Slopes]:
+        made = self.courses.of_terms(self.candidates.terms)
+        return [Slopes(own, terms) for own, (terms, _) in zip(rows, made, strict=True)]
 
     def _step(self, fit: SetFit, point: Point) -> FloatArray:
         return bounded_step(point.information, point.slope, *rooms(fit, point, _ranges(fit)))
@@ -97,31 +130,31 @@ class Flying:
         """The best that is reached with the slopes by nuisances as they are: two to four rows a flight."""
         share, span = 1.0, _ranges(fit)
         k = len(span)
-        slopes = [rows[:, 1 + k :] for rows in best.rows]
         for _ in range(ROUNDS):
             step = share * self._step(fit, best)
             if _promised(best, step) < SETTLED:
                 break
-            tried = self.point(fit, best.sizes + step[:k] * span, best.nuisances + step[k:], slopes)
+            tried = self.point(fit, best.sizes + step[:k] * span, best.nuisances + step[k:], best.slopes)
             best, share = (tried, 1.0) if tried.cost < best.cost else (best, 0.5 * share)
         return best
 
-    def point(self, fit: SetFit, sizes: FloatArray, nuisances: FloatArray, slopes: Sequence[FloatArray] = ()) -> Point:
+    def point(self, fit: SetFit, sizes: FloatArray, nuisances: FloatArray, slopes: Sequence[Slopes] = ()) -> Point:
         """A set flown at given sizes [k] and nuisances [n].
 
         Args:
-            slopes: of every record by nuisances [N x channels, n], where others will do; flown if omitted.
+            slopes: by nuisances of every record, where others will do; flown if omitted.
         """
         k, n = len(sizes), len(nuisances)
         steps = size_steps(fit, sizes)
-        gram, kept = np.zeros((1 + k + n, 1 + k + n)), []
-        for i, (flight, evidence) in enumerate(zip(self.flights, self.evidences, strict=True)):
-            rows = _rows(flight, self.candidates, fit, sizes, steps, nuisances)
-            moved = rows[: 1 + k] if slopes else rows
-            own = flown(flight, moved, (), evidence.gain, evidence.factor, keep=range(len(moved))).rows
-            own = np.column_stack([own, slopes[i]]) if slopes else own
-            gram += (own.T @ own + path_gram(flight, rows, (), round(SETTLE / flight.dt))) / self.tempering
-            kept.append(own)
+        gram, count = np.zeros((1 + k + n, 1 + k + n)), 1 + k if slopes else 1 + k + n
+        rows = [_rows(f, self.candidates, fit, sizes, steps, nuisances)[:count] for f in self.flights]
+        made = [flown(flight, own, (), evidence.gain, evidence.factor, keep=range(count)).rows
+                for flight, own, evidence in zip(self.flights, rows, self.evidences, strict=True)]
+        slopes = slopes or self._slopes([own[:, 1 + k :] for own in made])
+        made = [own[:, : 1 + k] for own in made]
+        for flight, own, left, lent in zip(self.flights, rows, made, slopes, strict=True):
+            gram += lent.beside(left) / self.tempering
+            gram[: 1 + k, : 1 + k] += path_gram(flight, own[: 1 + k], (), round(SETTLE / flight.dt)) / self.tempering
         span = _ranges(fit)
         unit = np.concatenate([[1.0], span / steps if k else [], np.full(n, 1.0 / NUISANCE_STEP)])
         gram = gram * unit[:, None] * unit
@@ -131,34 +164,32 @@ class Flying:
         information[k:, k:] += prior
         information[:k, :k] += np.eye(k)  # a size moves no farther than its range
         cost = 0.5 * (gram[0, 0] + nuisances @ prior @ nuisances)
-        return Point(sizes, nuisances, float(cost), slope, information, rows=kept)
+        return Point(sizes, nuisances, float(cost), slope, information, rows=made, slopes=slopes)
 
-    def left_over(self, fit: SetFit, point: Point, anew: bool = False) -> Remainder:
+    def left_over(self, fit: SetFit, point: Point) -> Remainder:
         """What a set leaves where it was flown, everything in it free to give way.
 
         What generic terms would make of the records is taken from flights about the model. With weights the point's
-        rows are flown again, the slopes by nuisances only if these are to be `anew`.
+        rows are flown again, but for the slopes by nuisances.
         """
         terms, k, n = self.candidates.terms, len(point.sizes), len(point.nuisances)
         first, steps = 1 + k + n, size_steps(fit, point.sizes)
         moved = tuple(replace(term, row=first + j) for j, term in enumerate(terms))
         gram, kept, left_in = np.zeros((first + len(terms),) * 2), [], dict.fromkeys(PATHS, 0.0)
-        again = first if anew else 1 + k
-        pushed = self.courses.pushed(terms, point.weights, again)
+        pushed = self.courses.pushed(terms, point.weights, 1 + k)
         for i, (flight, evidence, (generic, inner), pushes) in enumerate(zip(
                 self.flights, self.evidences, self.courses.of_terms(terms), pushed, strict=True)):
-            rows = _rows(flight, self.candidates, fit, point.sizes, steps, point.nuisances)
+            rows = _rows(flight, self.candidates, fit, point.sizes, steps, point.nuisances)[: 1 + k]
             for component, over in excess(flight, rows[:1]).items():
                 left_in[component] += over / self.tempering
-            own = point.rows[i]
+            own, slopes = point.rows[i], point.slopes[i]
             if point.weights:
-                found = flown(flight, rows[:again], pushes, evidence.gain, evidence.factor, keep=range(again))
-                own = np.column_stack([found.rows, own[:, again:]])
-            across = own.T @ generic
-            rows = np.concatenate([rows, np.repeat(rows[:1], len(terms))])
-            gram += (np.block([[own.T @ own, across], [across.T, inner]])
-                     + path_gram(flight, rows, moved, round(SETTLE / flight.dt))) / self.tempering
-            kept.append(own)
+                own = flown(flight, rows, pushes, evidence.gain, evidence.factor, keep=range(1 + k)).rows
+            across = np.concatenate([own.T @ generic, slopes.onto])
+            gram += np.block([[slopes.beside(own), across], [across.T, inner]]) / self.tempering
+            rows = np.take(rows, [*range(1 + k), *[0] * (n + len(terms))])
+            gram += path_gram(flight, rows, moved, round(SETTLE / flight.dt)) / self.tempering
+            kept.append((own, slopes.rows))
         precision = self.baseline.precision
         gram[first - n : first, first - n : first] += precision
         gram[first - n : first, 0] += precision @ point.nuisances
@@ -182,7 +213,7 @@ class Flying:
             total += found.gram / self.tempering
             taken += path_gram(of_paths(flight, home), rows, (), round(SETTLE / flight.dt)) / self.tempering
             if freed:
-                taken += freed[i].taken(found.rows, self.tempering)
+                taken += freed[i].taken([found.rows], self.tempering)
         prior, nothing = self.baseline.precision, np.zeros_like(self.baseline.precision)
         return [reduce(_holding(1 + point.held, with_prior(gram, self.candidates, prior, point.nuisances)),
                        self.candidates, nothing) for gram in (total, total - taken)]

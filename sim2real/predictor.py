@@ -184,6 +184,6 @@ def innovations(flight: Reconstruction, parameters: NDArray, gain: FloatArray,
     count = len(parameters)
     # two or three rows beside full lanes take longer than four
     spare = -count % QUICK if count % QUICK > 1 and gain.ndim == 3 else 0
-    flown = Predictor(flight, np.concatenate([parameters, np.repeat(parameters[-1:], spare)]))
+    flown = Predictor(flight, np.take(parameters, [*range(count), *[count - 1] * spare]))
     flown.place(0)
     return np.ascontiguousarray(flown.fly(len(flight.time) - 1, gain=gain, pushes=pushes)[:, :count])

@@ -32,7 +32,7 @@ def remainder(evidence: Evidence, target: str, size: float, seed: int = 0) -> tu
     response = compare(flight, rows, (Push(1, target, series, False),), evidence.gain, evidence.factor, keep=[1]).rows
     noise = np.random.default_rng(seed).standard_normal(response.shape) * np.any(evidence.whitened != 0.0)
     row = response + noise
-    return Remainder(row.T @ row, 1, [row], {}), float(np.sum(response**2))
+    return Remainder(row.T @ row, 1, [[row]], {}), float(np.sum(response**2))
 
 
 @pytest.mark.parametrize(("target", "home", "elsewhere"), [

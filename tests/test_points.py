@@ -50,9 +50,10 @@ def test_what_was_kept_of_the_terms_is_what_they_make_when_flown(flying):
 def test_a_point_with_slopes_from_elsewhere_costs_what_it_does_with_its_own(flying):
     away = 0.5 * np.random.default_rng(0).standard_normal(len(flying.candidates.nuisances))
     own = flying.point(NOTHING, np.zeros(0), away)
-    lent = flying.point(NOTHING, np.zeros(0), away, flying._near())
+    lent = flying.point(NOTHING, np.zeros(0), away, flying.near)
     assert lent.cost == pytest.approx(own.cost, rel=1e-12)
     assert lent.rows[0][:, 0] == pytest.approx(own.rows[0][:, 0], abs=1e-12)
+    assert lent.slopes[0] is flying.near[0]
 
 
 def test_it_settles_where_full_steps_of_gauss_and_newton_do(flying):
