@@ -16,6 +16,7 @@ from icing_env.record import FloatArray
 from sim2real.evidence import Evidence, flown, predicted
 from sim2real.paths import PATHS
 from sim2real.predictor import Push, innovations
+from sim2real.side_by_side import each
 from sim2real.terms import Term, at_any_time, pushes
 
 BENT = 0.0025  # of what a free course takes, that flights about the model leave because responses bend (assumed)
@@ -96,11 +97,11 @@ class Courses:
             return []
         for name in names:
             if name not in self._flown:
-                self._flown[name] = [_flown(e, at_any_time(e.flight, name, 1)) for e in self.evidences]
+                self._flown[name] = each(lambda e, at=name: _flown(e, at_any_time(e.flight, at, 1)), self.evidences)
         if names not in self._freed:
             self._freed[names] = []
-            for each in zip(*(self._flown[name] for name in names), strict=True):
-                rows = np.concatenate(each, axis=1)
+            for of_record in zip(*(self._flown[name] for name in names), strict=True):
+                rows = np.concatenate(of_record, axis=1)
                 inner = rows.T @ rows / self.tempering
                 inverse = np.linalg.inv(inner + np.eye(len(inner)))
                 self._freed[names].append(Freed(rows, inverse, float(np.sum(inverse * inner))))

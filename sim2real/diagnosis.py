@@ -26,6 +26,7 @@ from sim2real.reconstruct import Reconstruction, reconstruct
 from sim2real.references import Baseline, fit_baseline
 from sim2real.remedy import Remedy, leading, remedy, resimulation, values_of
 from sim2real.rollout import Rollout, difference, flying_as
+from sim2real.side_by_side import each
 from sim2real.surfaces import placed
 from sim2real.terms import in_common
 from sim2real.weigh import Progress, fit
@@ -114,10 +115,10 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     change = remedy(explained, unknown)
     progress("flying the records freely, before and after")
     sigma = float(np.mean([e.sigma_w for e in evidences]))
-    training = gap.together([gap.energies(f, change, e.sigma_w, seed + i, change.paths)
-                             for i, (f, e) in enumerate(zip(flights, evidences, strict=True))])
-    tested = gap.together([gap.energies(f, change, sigma, seed + 1000 + i, change.paths) for i, f in enumerate(others)]
-                          ) if others else None
+    training = gap.together(each(lambda i, f, e: gap.energies(f, change, e.sigma_w, seed + i, change.paths),
+                                 range(len(flights)), flights, evidences))
+    tested = gap.together(each(lambda i, f: gap.energies(f, change, sigma, seed + 1000 + i, change.paths),
+                               range(len(others)), others)) if others else None
     rungs = {"ladder": ladder(flights, others, candidates, baseline, evidences, posterior, explained, change, tested,
                               seed, progress)} if climb and tested is not None else {}  # fmt: skip
     enters_at = {name: effect.enters_at for name, effect in effects.LIBRARY.items()}

@@ -14,12 +14,13 @@ from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.attribution import reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, parameter_rows
-from sim2real.courses import Courses, Remainder
+from sim2real.courses import Courses, Freed, Remainder
 from sim2real.evidence import SETTLE, Evidence, compare, flown
 from sim2real.paths import PATHS, excess, of_paths, path_gram
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.sets import SetFit
+from sim2real.side_by_side import each
 
 ROUNDS, TURNS = 6, 3  # steps with the same slopes by nuisances, and how often these are flown anew
 SETTLED = 0.2  # gain of half the whitened square that is worth another round
@@ -148,8 +149,8 @@ class Flying:
         steps = size_steps(fit, sizes)
         gram, count = np.zeros((1 + k + n, 1 + k + n)), 1 + k if slopes else 1 + k + n
         rows = [_rows(f, self.candidates, fit, sizes, steps, nuisances)[:count] for f in self.flights]
-        made = [flown(flight, own, (), evidence.gain, evidence.factor, keep=range(count)).rows
-                for flight, own, evidence in zip(self.flights, rows, self.evidences, strict=True)]
+        made = each(lambda flight, own, e: flown(flight, own, (), e.gain, e.factor, keep=range(count)).rows,
+                    self.flights, rows, self.evidences)
         slopes = slopes or self._slopes([own[:, 1 + k :] for own in made])
         made = [own[:, : 1 + k] for own in made]
         for flight, own, left, lent in zip(self.flights, rows, made, slopes, strict=True):
@@ -204,16 +205,17 @@ class Flying:
         Then the same without what free courses of time at `home`, or a path there, would explain.
         """
         only = replace(self.candidates, terms=())
-        total = np.zeros((self.candidates.size, self.candidates.size))
-        taken, freed = total.copy(), self.courses.at(home)
-        for i, (flight, evidence) in enumerate(zip(self.flights, self.evidences, strict=True)):
+
+        def of_record(flight: Reconstruction, evidence: Evidence, free: Freed | None) -> tuple[FloatArray, FloatArray]:
             at = _rows(flight, self.candidates, fit, point.sizes, np.zeros(len(point.sizes)), point.nuisances)[:1]
             rows = parameter_rows(replace(flight, parameters=at), only)
             found = compare(flight, rows, (), evidence.gain, evidence.factor, keep=range(len(rows)))
-            total += found.gram / self.tempering
-            taken += path_gram(of_paths(flight, home), rows, (), round(SETTLE / flight.dt)) / self.tempering
-            if freed:
-                taken += freed[i].taken([found.rows], self.tempering)
+            own = path_gram(of_paths(flight, home), rows, (), round(SETTLE / flight.dt)) / self.tempering
+            courses = 0.0 if free is None else free.taken([found.rows], self.tempering)
+            return found.gram / self.tempering, own + courses
+
+        freed: Sequence[Freed | None] = self.courses.at(home) or [None] * len(self.flights)
+        total, taken = np.sum(each(of_record, self.flights, self.evidences, freed), axis=0)
         prior, nothing = self.baseline.precision, np.zeros_like(self.baseline.precision)
         return [reduce(_holding(1 + point.held, with_prior(gram, self.candidates, prior, point.nuisances)),
                        self.candidates, nothing) for gram in (total, total - taken)]

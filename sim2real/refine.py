@@ -269,14 +269,15 @@ class _Search:
     def posterior(self) -> Posterior:
         """All hypotheses with their probabilities.
 
-        Something unknown is believed only beside what has been flown: nothing, the best set, the best single effect.
+        Something unknown is believed only beside what has been flown: nothing, the best single effect. Beside a pair it
+        would be a third cause, and two effects of no account would pay for its terms.
         """
         ranked, others = self._ranked(), list[Hypothesis]()
         found = list(self.found)
         for i in dict.fromkeys([self.nothing_at_all(), ranked[0], *self._ranked(1)[:1]]):
             own, beside = self._beside(i)
             found[i] = replace(found[i], form=with_terms(found[i].form, own))
-            others += beside
+            others += beside if len(found[i].effects) < 2 else []
         bound = found[ranked[0]].log_posterior
         chosen = [i for i, h in enumerate(found) if i in self.points or (h.unknown is None and h.log_posterior < bound)]
         flown, kept = [k for k, i in enumerate(chosen) if i in self.points], [found[i] for i in chosen] + others

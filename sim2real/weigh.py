@@ -21,6 +21,7 @@ from sim2real.predictor import innovations
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.refine import refine
+from sim2real.side_by_side import each
 from sim2real.terms import pushes
 
 SETTLING, SETTLED = 4, 3.0  # steps towards the best nuisances, and the whitened length of a step that ends them
@@ -118,8 +119,7 @@ class _Weighing:
 
     def _judged(self, best: Hypothesis, nuisances: FloatArray) -> bool:
         """Find the gains with an explanation in the model; whether they are worth a flight."""
-        self.known = [explained(e, f, self.candidates, best, nuisances)
-                      for e, f in zip(self.evidences, self.flights, strict=True)]  # fmt: skip
+        self.known = each(lambda e, f: explained(e, f, self.candidates, best, nuisances), self.evidences, self.flights)
         return max(unlike(g, e.gain) for g, e in zip(self.known, self.evidences, strict=True)) > UNLIKE
 
     def refine(self) -> None:
@@ -188,8 +188,8 @@ def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseli
 def gather_about(flights: Sequence[Reconstruction], candidates: Bank, centre: FloatArray,
                  known: Sequence[Gain] | None = None) -> list[Evidence]:
     """Evidence of every record about the model moved by `centre` [n] standard deviations, with gains where known."""
-    return [gather(replace(f, parameters=shifted(f.parameters, candidates.nuisances, centre, f.power_from)), candidates,
-                   None if known is None else known[i]) for i, f in enumerate(flights)]  # fmt: skip
+    moved = [replace(f, parameters=shifted(f.parameters, candidates.nuisances, centre, f.power_from)) for f in flights]
+    return each(lambda flight, gain: gather(flight, candidates, gain), moved, known or [None] * len(moved))
 
 
 def nearer(centre: FloatArray, candidates: Bank) -> FloatArray:
