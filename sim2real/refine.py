@@ -228,6 +228,8 @@ class _Search:
         fits = self.generic[i]
         if known.effects and known.form is not None:
             own, fits = split(known.fit, fits, self.nothing, self.linear.raw)
+            if len(known.effects) > 1:  # a third cause: two effects of no account would pay for its terms
+                return own, []
             ways = [known.form.way(k, self.nothing, self._least(), self._bare()) for k in range(len(known.form.gained))]
             if 0 < (k := int(np.argmax(ways))) <= len(SHARES):
                 gained = known.form.gained[k] + float(np.log(OTHER_FORM))
@@ -269,15 +271,14 @@ class _Search:
     def posterior(self) -> Posterior:
         """All hypotheses with their probabilities.
 
-        Something unknown is believed only beside what has been flown: nothing, the best single effect. Beside a pair it
-        would be a third cause, and two effects of no account would pay for its terms.
+        Something unknown is believed only beside what has been flown: nothing, the best single effect.
         """
         ranked, others = self._ranked(), list[Hypothesis]()
         found = list(self.found)
         for i in dict.fromkeys([self.nothing_at_all(), ranked[0], *self._ranked(1)[:1]]):
             own, beside = self._beside(i)
             found[i] = replace(found[i], form=with_terms(found[i].form, own))
-            others += beside if len(found[i].effects) < 2 else []
+            others += beside
         bound = found[ranked[0]].log_posterior
         chosen = [i for i, h in enumerate(found) if i in self.points or (h.unknown is None and h.log_posterior < bound)]
         flown, kept = [k for k, i in enumerate(chosen) if i in self.points], [found[i] for i in chosen] + others
