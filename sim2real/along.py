@@ -115,10 +115,9 @@ def turn(x: Any, phi: float, roll: float, pitch: float) -> None:
     """Turn one row's attitude by small angles (rad): `roll` about body x, `pitch` about the horizontal y."""
     wy, wz = pitch * np.cos(phi), -pitch * np.sin(phi)
     e0, e1, e2, e3 = x[_E0], x[_E1], x[_E2], x[_E3]
-    x[_E0] = e0 + 0.5 * (-e1 * roll - e2 * wy - e3 * wz)
-    x[_E1] = e1 + 0.5 * (e0 * roll + e2 * wz - e3 * wy)
-    x[_E2] = e2 + 0.5 * (e0 * wy + e3 * roll - e1 * wz)
-    x[_E3] = e3 + 0.5 * (e0 * wz + e1 * wy - e2 * roll)
+    turned = (e0 + 0.5 * (-e1 * roll - e2 * wy - e3 * wz), e1 + 0.5 * (e0 * roll + e2 * wz - e3 * wy),
+              e2 + 0.5 * (e0 * wy + e3 * roll - e1 * wz), e3 + 0.5 * (e0 * wz + e1 * wy - e2 * roll))
+    x[_E0], x[_E1], x[_E2], x[_E3] = turned
 
 
 @kernel

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
 from sim2real.candidates import NUISANCE_STEP, Bank
@@ -96,7 +95,7 @@ def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision
     single = np.log((1.0 - P_NONE - P_UNKNOWN - P_PAIRS - P_TRIPLES - P_BESIDE) / max(len(names), 1))
     for name, own in alternatives.items():
         parameters = len({e.family.parameter.name for e in own})  # of equal prior; pieces of a range share one
-        log = float(logsumexp([e.log_evidence for e in own]) - np.log(parameters))
+        log = float(np.logaddexp.reduce([e.log_evidence for e in own]) - np.log(parameters))
         found.append(Hypothesis(_alone(fits[name]), None, single, log))
     found += _several(reduced, bank, [i for i, f in enumerate(bank.families) if f in by_family])
     found = [replace(h, form=_form(reduced, gram, bank, h.fit)) if h.effects else h for h in found]
@@ -166,17 +165,14 @@ def _form(reduced: FloatArray, raw: FloatArray, bank: Bank, fit: SetFit) -> Form
     """A set in another form (see `sim2real.form`), its sizes free to give way."""
     terms, slopes = own_terms(fit.effects, bank.terms), _slopes(fit)
     first, rows = 1 + len(slopes), [term.row for term in terms]
-    chosen = np.zeros((first + len(terms), len(reduced)))
-    chosen[0, 0] = 1.0
-    for row, weight in (fit.weights or {}).items():
-        chosen[0, row] = weight
-    for m, slope in enumerate(slopes):
-        chosen[1 + m, list(slope)] = list(slope.values())
-    chosen[range(first, len(chosen)), rows] = 1.0
+    used = sorted({0, *(fit.weights or {}), *(row for slope in slopes for row in slope)})
+    chosen = np.array([[w.get(row, 0.0) for row in used] for w in ({0: 1.0} | (fit.weights or {}), *slopes)])
+    inner, onto = chosen @ reduced[np.ix_(used, used)] @ chosen.T, chosen @ reduced[np.ix_(used, rows)]
+    together = np.block([[inner, onto], [onto.T, reduced[np.ix_(rows, rows)]]])
     kept = np.diag(reduced)[rows] / np.maximum(np.diag(raw)[rows], 1e-9)
     own = squares(fit, reduced)
     square = room(fit, own, may_bend(own, squares(fit, raw)), terms, kept, float(reduced[0, 0]))
-    return gain(*without(chosen @ reduced @ chosen.T, first), square, fit.misfit,
+    return gain(*without(together, first), square, fit.misfit,
                 shares(len(fit.families)), [term.component for term in terms])
 
 
@@ -191,7 +187,7 @@ def _with_unknown(reduced: FloatArray, raw: FloatArray, bank: Bank, known: Hypot
     if not fits:
         return own, []
     best = max(fits, key=lambda u: u.log_evidence)
-    gained = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
+    gained = float(np.logaddexp.reduce([u.log_evidence for u in fits]) - np.log(len(fits)))
     share = np.log(P_BESIDE / (1.0 - P_NONE)) + known.log_prior if known.effects else np.log(P_UNKNOWN)
     return own, [Hypothesis(known.fit, best, float(share), known.log_evidence + gained)]
 

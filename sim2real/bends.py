@@ -10,6 +10,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from icing_env import aircraft
 from icing_env.effects import Effect, Parameter
@@ -22,7 +23,7 @@ COMPONENTS = {"CX": "x_force", "CY": "y_force", "CZ": "z_force", "Cl": "rolling_
 @cache
 def changes(effect: Effect) -> frozenset[str]:
     """Numbers of the aircraft (of PARAMETERS) that an effect changes."""
-    plain = aircraft.load()
+    plain = _plain()
     row = plain.copy()
     effect.apply(row, effect.neutral() | {p.name: _some(p) for p in effect.parameters})
     return frozenset(name for name in row.dtype.names or () if np.any(row[name] != plain[name]))
@@ -35,6 +36,11 @@ def bends(effect: Effect) -> frozenset[tuple[str, str]]:
     pairs = [(COMPONENTS[name[:2]], name[3:].rstrip("2")) for name in changed if not name.endswith("_0")]
     powers = (2, 3) if len(pairs) == 1 else (1, 2, 3)
     return frozenset((component, "*".join([by] * power)) for component, by in pairs for power in powers)
+
+
+@cache
+def _plain() -> NDArray:
+    return aircraft.load()
 
 
 def _some(parameter: Parameter) -> float:

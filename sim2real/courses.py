@@ -8,14 +8,14 @@ flown once about the model: the filter follows the record, so that an explanatio
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from icing_env.record import FloatArray
-from sim2real.evidence import Evidence, flown, predicted
+from sim2real.evidence import Evidence
 from sim2real.paths import PATHS
-from sim2real.predictor import Push, innovations
+from sim2real.predictor import Push
 from sim2real.side_by_side import each
 from sim2real.terms import Term, at_any_time, pushes
 
@@ -47,32 +47,80 @@ class Remainder:
 
 @dataclass(frozen=True)
 class Freed:
-    """Free courses of time in one record.
+    """Free courses of time at some components along one record.
 
-    Attributes:
-        rows: what they make of it [N x channels, knots].
-        inverse: of their inner products (tempered) and the prior's [knots, knots].
-        chance: whitened square that they take of noise.
+    inverse: of their inner products (tempered) and the prior's [knots, knots]; chance: whitened square that they take
+    of noise.
     """
 
-    rows: FloatArray
     inverse: FloatArray
     chance: float
 
-    def taken(self, parts: Sequence[FloatArray], tempering: float) -> FloatArray:
-        """What they explain of the inner products (tempered) of other rows, in parts side by side [rows, rows]."""
-        cross = np.concatenate([self.rows.T @ rows for rows in parts], axis=1) / tempering
-        return np.asarray(cross.T @ self.inverse @ cross)
+
+class Course:
+    """Free courses of time along one record, made when they are first asked for."""
+
+    def __init__(self, evidence: Evidence, tempering: float) -> None:
+        if evidence.linear is None:
+            raise ValueError("candidates were not flown along this record")
+        self.about, self.tempering = evidence.linear, tempering
+        self._rows: dict[str, FloatArray] = {}
+        self._inner: dict[tuple[str, str], FloatArray] = {}
+        self._freed: dict[tuple[str, ...], Freed] = {}
+        self._onto: dict[tuple[str, int], tuple[FloatArray, FloatArray]] = {}
+
+    def pushes(self, terms: Sequence[Term]) -> tuple[Push, ...]:
+        """Time courses of generic terms along the record as the model predicts it."""
+        return pushes(self.about.flight, terms)
+
+    def rows(self, component: str) -> FloatArray:
+        """What hats at a component make of the record [N x channels, knots]."""
+        if component not in self._rows:
+            hats = at_any_time(self.about.flight, component, 0)
+            self._rows[component] = self.about.respond(self.pushes(hats)).values
+        return self._rows[component]
+
+    def inner(self, one: str, other: str) -> FloatArray:
+        """Inner products of the hats at two components."""
+        if one > other:
+            return self.inner(other, one).T
+        if (one, other) not in self._inner:
+            self._inner[one, other] = self.rows(one).T @ self.rows(other)
+        return self._inner[one, other]
+
+    def freed(self, names: tuple[str, ...]) -> Freed:
+        """Free courses at components that are no paths."""
+        if names not in self._freed:
+            inner = np.block([[self.inner(one, other) for other in names] for one in names]) / self.tempering
+            inverse = np.asarray(np.linalg.inv(inner + np.eye(len(inner))), np.float64)
+            self._freed[names] = Freed(inverse, float(np.sum(inverse * inner)))
+        return self._freed[names]
+
+    def taken(self, names: tuple[str, ...], parts: Sequence[FloatArray], again: bool = True) -> FloatArray:
+        """What they explain of the inner products (tempered) of other rows, in parts side by side [rows, rows].
+
+        Args:
+            again: whether the same parts will be asked for again.
+        """
+        cross = np.block([[self._cross(name, part, again) for part in parts] for name in names]) / self.tempering
+        return np.asarray(cross.T @ self.freed(names).inverse @ cross)
+
+    def _cross(self, name: str, part: FloatArray, again: bool) -> FloatArray:
+        """Inner products of the hats at a component with other rows."""
+        if not again:
+            return np.asarray(self.rows(name).T @ part)
+        if (name, id(part)) not in self._onto:  # the part is kept with them, so that its id stays its own
+            self._onto[name, id(part)] = part, self.rows(name).T @ part
+        return self._onto[name, id(part)][1]
 
 
 class Courses:
-    """Generic terms and free courses along some records, flown when they are first asked for."""
+    """Generic terms and free courses along some records."""
 
     def __init__(self, evidences: Sequence[Evidence], tempering: float) -> None:
-        self.evidences, self.tempering = evidences, tempering
-        self._flown: dict[str, list[FloatArray]] = {}
+        self.evidences = evidences
+        self.along = [Course(e, tempering) for e in evidences]
         self._terms: list[tuple[FloatArray, FloatArray]] = []
-        self._freed: dict[tuple[str, ...], list[Freed]] = {}
         self._pushed: list[tuple[Push, ...]] = []
 
     def pushed(self, terms: Sequence[Term], weights: Mapping[int, float], rows: int) -> list[tuple[Push, ...]]:
@@ -80,8 +128,8 @@ class Courses:
         if not weights:
             return [()] * len(self.evidences)
         if not self._pushed:
-            self._pushed = [_pushes(e, terms) for e in self.evidences]
-        return [_together(pushes, weights, rows) for pushes in self._pushed]
+            self._pushed = [course.pushes(terms) for course in self.along]
+        return [_together(pushed, weights, rows) for pushed in self._pushed]
 
     def of_terms(self, terms: Sequence[Term]) -> list[tuple[FloatArray, FloatArray]]:
         """What generic terms make of every record [N x channels, terms], and its inner products; always the same."""
@@ -90,46 +138,23 @@ class Courses:
             self._terms = [(rows, rows.T @ rows) for rows in own]
         return self._terms
 
-    def at(self, components: Collection[str]) -> list[Freed]:
-        """Free courses at some components, for every record; none if they are paths only."""
-        names = tuple(sorted(c for c in components if c not in PATHS[:-1]))
-        if not names:
-            return []
-        for name in names:
-            if name not in self._flown:
-                self._flown[name] = each(lambda e, at=name: _flown(e, at_any_time(e.flight, at, 1)), self.evidences)
-        if names not in self._freed:
-            self._freed[names] = []
-            for of_record in zip(*(self._flown[name] for name in names), strict=True):
-                rows = np.concatenate(of_record, axis=1)
-                inner = rows.T @ rows / self.tempering
-                inverse = np.linalg.inv(inner + np.eye(len(inner)))
-                self._freed[names].append(Freed(rows, inverse, float(np.sum(inverse * inner))))
-        return self._freed[names]
-
     def free(self, left: Remainder, components: Collection[str]) -> float:
         """Whitened square above chance that free courses at some components would take of what is left."""
         taken = sum(left.excess.get(component, 0.0) for component in components)
         gram = before = left.gram[: left.first, : left.first]
-        for rows, freed in zip(left.rows, self.at(components), strict=False):
-            gram = gram - freed.taken(rows, self.tempering)
-            taken -= freed.chance
+        if names := in_time(components):
+            for course, less in zip(self.along, each(lambda c, rows: c.taken(names, rows), self.along, left.rows),
+                                    strict=True):
+                gram = gram - less
+                taken -= course.freed(names).chance
         by_courses = float(projected(before, left.first, left.held)[0, 0]
                            - projected(gram, left.first, left.held)[0, 0])
         return max(taken + (1.0 + BENT) * by_courses, 0.0)
 
 
-def _flown(evidence: Evidence, terms: Sequence[Term]) -> FloatArray:
-    """What terms make of one record, flown about the model [N x channels, terms]."""
-    rows = np.repeat(evidence.flight.parameters, 1 + len(terms))
-    return flown(evidence.flight, rows, _pushes(evidence, terms), evidence.gain, evidence.factor,
-                 keep=range(1, len(rows))).rows
-
-
-def _pushes(evidence: Evidence, terms: Sequence[Term]) -> tuple[Push, ...]:
-    flight = evidence.flight
-    base = innovations(flight, flight.parameters, evidence.gain.K)[:, 0]
-    return pushes(replace(flight, measured=predicted(flight, base)), terms)
+def in_time(components: Collection[str]) -> tuple[str, ...]:
+    """Those components where courses of time may be free: no actuators, whose paths are judged by themselves."""
+    return tuple(sorted(c for c in components if c not in PATHS[:-1]))
 
 
 def _together(pushed: Sequence[Push], weights: Mapping[int, float], rows: int) -> tuple[Push, ...]:

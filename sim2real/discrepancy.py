@@ -153,7 +153,7 @@ def describe_unknown(flights: Sequence[Reconstruction], candidates: Bank, eviden
         gram = np.zeros((first + n, first + n))
         for flight, evidence in zip(flights, evidences, strict=True):
             rows = _rows(flight, only, hypothesis.fit, terms, at, x + step, turn)
-            gram += compare(flight, rows, (), evidence.gain, evidence.factor).gram
+            gram += compare(flight, rows, evidence.gain, evidence.factor).gram
         gram = with_prior(gram / tempering, only, precision, turn)
         reduced = reduce(gram, only, np.zeros_like(precision))
         cost = float(reduced[0, 0])

@@ -20,13 +20,15 @@ from sim2real.candidates import Bank, parameter_rows
 from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR
 from sim2real.kalman import Gain, follow, gains
 from sim2real.paths import counted, path_gram, path_residuals
-from sim2real.predictor import Push, held, innovations
+from sim2real.predictor import Push, held, innovations, predicted
 from sim2real.reconstruct import Reconstruction
+from sim2real.response import Filter, Responses
 from sim2real.terms import Term, pushes
 
 SIGMAS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.55, 0.67, 0.82, 1.0, 1.2, 1.45, 1.75, 2.1, 2.6, 3.2)  # m/s
 SETTLE = 4.0  # s, until the predictor has forgotten how it was started
 CHUNK = 500  # samples whitened at a time
+NONE = Responses()
 FARTHEST = 1e5  # noise units: a variant that departs from flight is no nearer to the record for being a number
 
 
@@ -42,6 +44,7 @@ class Evidence:
         samples: whitened numbers behind the inner products.
         whitened: [N, channels of MEASURED], v itself, for showing where the gap lies.
         rows: [N x channels, kept] what is behind `gram` but for the paths, of the rows that were kept.
+        linear: the predictor linearised along the model's flight, where the candidates were flown.
     """
 
     gram: FloatArray
@@ -51,6 +54,7 @@ class Evidence:
     whitened: FloatArray
     flight: Reconstruction
     rows: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    linear: Filter | None = None
 
     @property
     def sigma_w(self) -> float:
@@ -68,44 +72,49 @@ def gather(flight: Reconstruction, bank: Bank, gain: Gain | None = None) -> Evid
         gain = follow(flight, choose_gain(flight, gains(flight, SIGMAS)))
     base = innovations(flight, flight.parameters, gain.K)[:, 0]
     factor = whitening(base, gain, flight)
-    pushed = pushes(replace(flight, measured=predicted(flight, base)), bank.terms)
-    return compare(flight, parameter_rows(flight, bank), pushed, gain, factor, bank.terms, bank.linear)
+    about = Filter(replace(flight, measured=predicted(flight, base)), gain, factor, round(SETTLE / flight.dt))
+    known = about.respond(pushes(about.flight, bank.terms))
+    return replace(compare(flight, parameter_rows(flight, bank), gain, factor, bank.terms, bank.linear, known),
+                   linear=about)
 
 
-def compare(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain: Gain,
-            factor: FloatArray, terms: Sequence[Term] = (), keep: Sequence[int] = ()) -> Evidence:
+def compare(flight: Reconstruction, rows: NDArray, gain: Gain, factor: FloatArray, terms: Sequence[Term] = (),
+            keep: Sequence[int] = (), linear: Responses = NONE) -> Evidence:
     """Inner products of rows flown along one record, the first being the one that the others are compared with.
 
     Args:
         terms: generic ones, of which those of a path are judged there.
         keep: rows that are wanted themselves.
+        linear: rows whose response is known and that are not flown.
     """
-    found, first = flown(flight, rows, pushed, gain, factor, keep), round(SETTLE / flight.dt)
+    found, first = flown(flight, rows, (), gain, factor, keep, linear), round(SETTLE / flight.dt)
     samples = counted(flight, len(flight.time) - first) * len(path_residuals(flight, rows[:1]))
     return replace(found, gram=found.gram + path_gram(flight, rows, terms, first), samples=found.samples + samples)
 
 
 def flown(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain: Gain, factor: FloatArray,
-          keep: Sequence[int] = ()) -> Evidence:
+          keep: Sequence[int] = (), linear: Responses = NONE) -> Evidence:
     """The same but for the paths, which do not care how the aircraft flies."""
     moved = flown_rows(flight, rows, {q.row for q in pushed})
-    index = {row: i for i, row in enumerate(moved)}
+    index = {row: i for i, row in enumerate([*moved, *linear.rows])}
     renamed = tuple(replace(q, row=index[q.row]) for q in pushed)
     left = innovations(flight, rows[moved], gain.K, renamed)
     first = round(SETTLE / flight.dt)
-    inner, samples = np.zeros((len(moved), len(moved))), 0
+    inner, samples = np.zeros((len(index), len(index))), 0
     whitened = np.zeros((len(left), len(MEASURED)))
     kept = np.zeros(((len(left) - first) * len(MEASURED), len(keep)))
     at = np.array([(i, index[row]) for i, row in enumerate(keep) if row in index], np.intp).reshape(-1, 2)
     for k in range(first, len(left), CHUNK):
-        flat = np.empty((len(left[k : k + CHUNK]) * len(MEASURED), len(moved)))
+        flat = np.empty((len(left[k : k + CHUNK]) * len(MEASURED), len(index)))
         _departures(left[k : k + CHUNK], factor[k : k + CHUNK], FARTHEST, flat)
+        if linear.rows:
+            flat[:, len(moved) :] = linear.values[(k - first) * len(MEASURED) :][: len(flat)]
         whitened[k : k + CHUNK] = flat[:, 0].reshape(-1, len(MEASURED))
         samples += int(np.count_nonzero(flat[:, 0]))
         kept[(k - first) * len(MEASURED) :][: len(flat), at[:, 0]] = flat[:, at[:, 1]]
         inner += flat.T @ flat
     gram = np.zeros((len(rows), len(rows)))
-    gram[np.ix_(moved, moved)] = inner
+    gram[np.ix_([*index], [*index])] = inner
     return Evidence(gram, gain, factor, samples, whitened, flight, kept)
 
 
@@ -135,17 +144,6 @@ def choose_gain(flight: Reconstruction, options: list[Gain], pushed: Sequence[Pu
         away = np.median(np.abs(white - np.median(white, axis=1, keepdims=True)), axis=1)
         scores.append(-0.5 * np.sum((1.4826 * away) ** 2) - np.sum(np.log(np.diag(factor))))
     return options[int(np.argmax(scores))]
-
-
-def predicted(flight: Reconstruction, left: FloatArray) -> FloatArray:
-    """One-step predictions of the channels [N, channels].
-
-    They carry no noise of the sample they belong to, so that time courses made of them cannot fit that noise.
-    """
-    out = flight.measured.copy()
-    out[1:] -= left
-    out[0] = out[1]
-    return out
 
 
 def whitening(left: FloatArray, gain: Gain, flight: Reconstruction) -> FloatArray:

@@ -15,7 +15,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.special import logsumexp
 
 from icing_env import effects
 from icing_env.record import FloatArray
@@ -91,14 +90,14 @@ class Form:
             noise: that the best one leaves.
             bare: that the best one leaves beside free courses of time at home.
         """
-        return float(logsumexp([self.way(k, nothing, noise, bare) for k in range(len(self.gained))]))
+        return float(np.logaddexp.reduce([self.way(k, nothing, noise, bare) for k in range(len(self.gained))]))
 
     def way(self, k: int, nothing: float, noise: float, bare: float) -> float:
         """The same of one way, by how much the terms may take."""
         flown = self.bent and 0 < k < len(self.gained) - self.beside
         left, free = self.left[k], self.bent if flown else self.free
         found = [forgiven(left - noise, nothing - left, max(at.beyond - bare, 0.0), at.places, at.most) for at in free]
-        return self.gained[k] + float(logsumexp(found) - np.log(len(found)))
+        return self.gained[k] + float(np.logaddexp.reduce(found) - np.log(len(found)))
 
     def bare(self) -> float:
         """Whitened square that is left beside free courses of time, a little for luck."""

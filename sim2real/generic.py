@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
 from sim2real.candidates import Bank
@@ -44,18 +43,21 @@ def beside(reduced: FloatArray, bank: Bank, fit: SetFit, slopes: list[dict[int, 
         slopes: weights of the flown rows in each member's slope per standard deviation of its estimate: a member may
             move by its own uncertainty, no farther.
     """
-    moved = np.eye(len(reduced))
-    for row, weight in (fit.weights or {}).items():
-        moved[0, row] += weight
-    out = moved @ reduced @ moved.T
+    rows, weights = list(fit.weights or {}), np.array(list((fit.weights or {}).values()))
+
+    def moved(inner: FloatArray) -> FloatArray:
+        inner[:, 0] += inner[:, rows] @ weights
+        return inner
+
+    out = reduced.copy()
+    out[0] += weights @ reduced[rows]
+    out = moved(out)
     if not slopes:
-        return np.asarray(out)
-    change = np.zeros((len(slopes), len(reduced)))
-    for m, slope in enumerate(slopes):
-        change[m, list(slope)] = list(slope.values())
-    onto = change @ reduced @ moved.T
-    inner = change @ reduced @ change.T + 1e-2 * np.eye(len(slopes))
-    return np.asarray(out - onto.T @ np.linalg.solve(inner, onto))
+        return out
+    onto = np.array([np.array(list(slope.values())) @ reduced[list(slope)] for slope in slopes])
+    inner = np.array([onto[:, list(slope)] @ np.array(list(slope.values())) for slope in slopes]).T
+    onto = moved(onto)
+    return np.asarray(out - onto.T @ np.linalg.solve(inner + 1e-2 * np.eye(len(slopes)), onto))
 
 
 def _by_timing(terms: Sequence[Term], T: FloatArray, t: FloatArray) -> float:
@@ -85,8 +87,8 @@ def fit_unknown(reduced: FloatArray, bank: Bank) -> list[UnknownFit]:
             continue
         joint = [_joint(T, t, scale) for scale in SCALES]
         alone = np.array([_each_alone(T, t, scale) for scale in SCALES])
-        together = float(logsumexp([log for log, _, _ in joint])) - np.log(2 * len(SCALES))
-        single = float(logsumexp(alone)) - np.log(2 * alone.size)
+        together = float(np.logaddexp.reduce([log for log, _, _ in joint])) - np.log(2 * len(SCALES))
+        single = float(np.logaddexp.reduce(alone, axis=None)) - np.log(2 * alone.size)
         if single > together:
             k, chosen = divmod(int(np.argmax(alone)), len(rows))
             variance = 1.0 / (SCALES[k] ** -2 + T[chosen, chosen])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import logsumexp, softmax
@@ -40,7 +41,7 @@ class Hypothesis:
     regained: float = 0.0
     probability: float = 0.0
 
-    @property
+    @cached_property
     def effects(self) -> tuple[str, ...]:
         """Names, in alphabetical order."""
         return tuple(sorted(self.fit.effects))
@@ -180,6 +181,7 @@ def forgive(found: Sequence[Hypothesis], nothing: float, least: float, bare: flo
     """
     alone = [replace(h, regained=_regained(h, nothing, least, bare)) for h in found]
     larger = alone if believed is None else [alone[i] for i in believed]
+    larger = [h for h in larger if h.unknown is None and len(h.effects) > 1]
     return [_with_guests(h, larger, nothing) for h in alone]
 
 
@@ -191,9 +193,10 @@ def _with_guests(h: Hypothesis, larger: Sequence[Hypothesis], nothing: float) ->
     """
     if not h.effects or h.unknown is not None:
         return h
+    own = set(h.effects)
     gained = [g.log_evidence + g.regained - h.log_evidence for g in larger
-              if g.unknown is None and len(g.effects) == len(h.effects) + 1 and set(h.effects) < set(g.effects)
-              and all(within(name, h.effects) for name in set(g.effects) - set(h.effects))
+              if len(g.effects) == len(own) + 1 and own < set(g.effects)
+              and all(within(name, h.effects) for name in set(g.effects) - own)
               and nothing - h.fit.misfit > MOSTLY * (nothing - g.fit.misfit)]
     if not gained:
         return h

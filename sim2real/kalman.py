@@ -58,7 +58,7 @@ def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),)) -
                                                                                         FloatArray]:
     """A, C of the one-step map about the record's typical state in each span, and B for a step of each surface [rad].
 
-    z' = A z, y' = C z with y' the reading at the end of the step; the first axis goes over the spans.
+    z' = A z, y' = C z with y' all readings at the end of the step; the first axis goes over the spans.
     """
     size = np.full(len(TANGENT), 1e-4)
     size[[TANGENT.index(n) for n in ("u", "v", "w", "altitude", "pitot")]] = 1e-2
@@ -80,13 +80,13 @@ def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),)) -
     A = np.swapaxes((z[:, :n] - z[:, n : 2 * n]) / (2.0 * size[:, None]), 1, 2)
     C = np.swapaxes((y[:, :n] - y[:, n : 2 * n]) / (2.0 * size[:, None]), 1, 2)
     B = np.stack([(z[:, 2 * n + 2 * j] - z[:, 2 * n + 2 * j + 1]) / 2e-3 for j in range(3)], axis=2)
-    return A, C[:, :FED_BACK], B
+    return A, C, B
 
 
 def gains(flight: Reconstruction, sigmas: tuple[float, ...]) -> list[Gain]:
     """Steady gain and innovation covariance for each gust intensity."""
     A, C, B = (matrix[0] for matrix in linearise(flight))
-    out = []
+    C, out = C[:FED_BACK], list[Gain]()
     for sigma in sigmas:
         Qw, columns = _gusts(flight, sigma)
         rough = roughness(A, C, A[:, columns], C[:, columns], Qw)
@@ -110,7 +110,7 @@ def follow(flight: Reconstruction, gain: Gain) -> Gain:
     noise = np.diag(gain.model[3] - D @ Qw @ D.T) * rate
     K, S = [], []
     for span, A, C, B in zip(spans, *linearise(flight, spans), strict=True):
-        model = _noisy(flight, A, C, B, Qw, noise)
+        model = _noisy(flight, A, C[:FED_BACK], B, Qw, noise)
         here, covariance, P = _recursion(*model, P, min(each, steps - span.start))
         K.append(np.swapaxes(here, 1, 2))
         S.append(covariance)

@@ -180,12 +180,13 @@ def _signatures(made: Reconstruction, candidates: Bank, sigma: float, moved: Flo
     for nuisance, sizes in zip(candidates.nuisances, moved.T, strict=True):
         if sizes.any():
             nuisance.apply(rows, slice(None), made.power_from, sizes)
-    return compare(made, rows, (), gain, _factor(made, gain.S)).gram
+    return compare(made, rows, gain, _factor(made, gain.S)).gram
 
 
 def _apparent(made: Reconstruction, sigma: float) -> FloatArray:
     """Noise as a record would show it, gusts included: the gain takes off again what gusts add to it."""
     A, C, _ = (matrix[0] for matrix in linearise(made))
+    C = C[:FED_BACK]
     columns = [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
     Qw = gust_noise(sigma, float(np.median(made.channel("airspeed"))), float(np.median(made.altitude)), made.dt)
     added = roughness(A, C, A[:, columns], C[:, columns], Qw)

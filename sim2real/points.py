@@ -14,7 +14,7 @@ from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.attribution import reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, parameter_rows
-from sim2real.courses import Courses, Freed, Remainder
+from sim2real.courses import Course, Courses, Remainder, in_time
 from sim2real.evidence import SETTLE, Evidence, compare, flown
 from sim2real.paths import PATHS, excess, of_paths, path_gram
 from sim2real.reconstruct import Reconstruction
@@ -206,16 +206,17 @@ class Flying:
         """
         only = replace(self.candidates, terms=())
 
-        def of_record(flight: Reconstruction, evidence: Evidence, free: Freed | None) -> tuple[FloatArray, FloatArray]:
+        names = in_time(home)
+
+        def of_record(flight: Reconstruction, evidence: Evidence, course: Course) -> tuple[FloatArray, FloatArray]:
             at = _rows(flight, self.candidates, fit, point.sizes, np.zeros(len(point.sizes)), point.nuisances)[:1]
             rows = parameter_rows(replace(flight, parameters=at), only)
-            found = compare(flight, rows, (), evidence.gain, evidence.factor, keep=range(len(rows)))
+            found = compare(flight, rows, evidence.gain, evidence.factor, keep=range(len(rows)))
             own = path_gram(of_paths(flight, home), rows, (), round(SETTLE / flight.dt)) / self.tempering
-            courses = 0.0 if free is None else free.taken([found.rows], self.tempering)
+            courses = course.taken(names, [found.rows], again=False) if names else 0.0
             return found.gram / self.tempering, own + courses
 
-        freed: Sequence[Freed | None] = self.courses.at(home) or [None] * len(self.flights)
-        total, taken = np.sum(each(of_record, self.flights, self.evidences, freed), axis=0)
+        total, taken = np.sum(each(of_record, self.flights, self.evidences, self.courses.along), axis=0)
         prior, nothing = self.baseline.precision, np.zeros_like(self.baseline.precision)
         return [reduce(_holding(1 + point.held, with_prior(gram, self.candidates, prior, point.nuisances)),
                        self.candidates, nothing) for gram in (total, total - taken)]

@@ -61,8 +61,7 @@ class Predictor:
 
     def place_in(self, spans: Sequence[slice], each: int) -> None:
         """Put `each` rows after another at the typical state of each span of the record."""
-        values = [typical_state(self.flight, span) for span in spans]
-        put(self.fleet, {name: np.repeat([v[name] for v in values], each) for name in values[0]})
+        put(self.fleet, {name: np.repeat(values, each) for name, values in typical_states(self.flight, spans).items()})
 
     def fly(self, steps: int, first: int | NDArray[np.intp] = 0, gain: FloatArray | None = None,
             pushes: tuple[Push, ...] = ()) -> FloatArray:
@@ -83,8 +82,7 @@ class Predictor:
         controls = np.column_stack([flight.controls[name] for name in CONTROLS])
         start = np.full(self.n, first, np.intp) if isinstance(first, int) else np.asarray(first, np.intp)
         K = np.zeros((0, 0, 0, 0)) if gain is None else gain[None] if gain.ndim == 3 else gain
-        share = np.mean(np.isfinite(flight.measured[:, :FED_BACK]), axis=0)
-        stretch = 1.0 / np.maximum(share, 1e-3)  # a sparse channel's share comes at once
+        stretch = np.max(seen(flight), axis=0, initial=1.0)[:FED_BACK]
         forces = [(q.row, X[STATES.index(q.target)], q.series * flight.dt) for q in pushes if not q.sensor]
         felt = [(q.row, MEASURED.index("a" + "xyz"["uvw".index(q.target)]), q.series) for q in pushes
                 if not q.sensor and q.target in "uvw"]  # fmt: skip
@@ -104,8 +102,7 @@ class Predictor:
     def correct(self, change: FloatArray) -> None:
         """Add `change` [n, TANGENT] to the states."""
         self.x[:, X] += change[:, : len(STATES)]
-        for row, phi, (roll, pitch) in zip(self.x, self.fleet.measurement["phi"], change[:, -2:], strict=True):
-            _PLAIN_TURN(row, phi, roll, pitch)
+        _PLAIN_TURN(self.x.T, self.fleet.measurement["phi"], *change[:, -2:].T)
 
     def tangent(self) -> FloatArray:
         """States as a vector [n, TANGENT]."""
@@ -113,6 +110,15 @@ class Predictor:
         phi = np.arctan2(2.0 * (e0 * e1 + e2 * e3), 1.0 - 2.0 * (e1 * e1 + e2 * e2))
         theta = np.arcsin(np.clip(2.0 * (e0 * e2 - e1 * e3), -1.0, 1.0))
         return np.column_stack([self.x[:, X], phi, theta])
+
+
+def seen(flight: Reconstruction) -> FloatArray:
+    """Weight of every reading in the correction [N, channels]: none where nothing was measured.
+
+    A sparse channel's share comes at once.
+    """
+    there = np.isfinite(flight.measured)
+    return np.asarray(there / np.maximum(np.mean(there, axis=0), 1e-3))
 
 
 def _listed(items: list[tuple[int, int, FloatArray]]) -> tuple[NDArray[np.intp], FloatArray]:
@@ -138,11 +144,15 @@ def held(parameters: NDArray, dt: float) -> NDArray:
 
 
 def typical_state(flight: Reconstruction, span: slice) -> dict[str, float]:
-    """State of the samples in `span`, as `put` takes it: their median, their mean where they are few."""
-    typical = np.median if span == slice(None) else np.mean
-    mean = {name: float(typical(flight.channel(name)[span])) for name in MEASURED[:8]}
-    mean |= {name: float(typical(series[span])) for name, series in flight.controls.items()}
-    return mean | {"altitude": float(typical(flight.altitude[span]))}
+    """State of the samples in `span`, as `put` takes it: their mean."""
+    return {name: float(values[0]) for name, values in typical_states(flight, [span]).items()}
+
+
+def typical_states(flight: Reconstruction, spans: Sequence[slice]) -> dict[str, FloatArray]:
+    """The same of several spans; the median of the whole record where that is the only one."""
+    series = {name: flight.channel(name) for name in MEASURED[:8]} | flight.controls | {"altitude": flight.altitude}
+    typical = np.median if list(spans) == [slice(None)] else np.mean
+    return {name: np.array([typical(values[span]) for span in spans]) for name, values in series.items()}
 
 
 def put(fleet: Fleet, values: Mapping[str, float | FloatArray]) -> None:
@@ -187,3 +197,14 @@ def innovations(flight: Reconstruction, parameters: NDArray, gain: FloatArray,
     flown = Predictor(flight, np.take(parameters, [*range(count), *[count - 1] * spare]))
     flown.place(0)
     return np.ascontiguousarray(flown.fly(len(flight.time) - 1, gain=gain, pushes=pushes)[:, :count])
+
+
+def predicted(flight: Reconstruction, left: FloatArray) -> FloatArray:
+    """One-step predictions of the channels [N, channels].
+
+    They carry no noise of the sample they belong to, so that time courses made of them cannot fit that noise.
+    """
+    out = flight.measured.copy()
+    out[1:] -= left
+    out[0] = out[1]
+    return out

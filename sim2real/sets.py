@@ -83,10 +83,12 @@ def pairs(problem: Powers, testable: Sequence[int], grid: Grid) -> Modes:
     chosen = np.array([(i, j) for i in testable for j in testable if i < j and names[i] != names[j]], np.intp)
     x, energy, cross = grid
     start = np.empty((len(chosen), 2))
-    for n, (i, j) in enumerate(chosen):
-        together = energy[i][:, None] + energy[j][None, :] + cross[i, :, j, :]
-        a, b = np.unravel_index(int(np.argmin(together)), together.shape)
-        start[n] = x[i, a], x[j, b]
+    for i in {int(i) for i, _ in chosen}:
+        at = np.flatnonzero(chosen[:, 0] == i)
+        others = chosen[at, 1]
+        together = energy[i][:, None, None] + energy[others] + cross[i][:, others]  # [own size, other, its size]
+        best = np.argmin(np.swapaxes(together, 0, 1).reshape(len(at), -1), axis=1)
+        start[at, 0], start[at, 1] = x[i, best // COARSE], x[others, best % COARSE]
     return descend(problem, chosen.reshape(-1, 2), start)
 
 
@@ -94,6 +96,7 @@ def grow(problem: Powers, found: Modes, testable: Sequence[int], grid: Grid) -> 
     """Sets with one member more than the SEEDS best of `found`; `grid` of `sizes_tried`."""
     names = [f.effect.name for f in problem.families]
     members: list[tuple[int, ...]] = []
+    known: set[frozenset[int]] = set()
     start: list[tuple[float, ...]] = []
     x, _, cross = grid
     for n in np.argsort(-found.log)[:SEEDS]:
@@ -104,8 +107,10 @@ def grow(problem: Powers, found: Modes, testable: Sequence[int], grid: Grid) -> 
             w[_columns(problem, int(m))] = at ** np.arange(1, problem.degree + 1)
         slope = problem.gram @ w
         for j in testable:
-            if names[j] in inside or {*map(int, base), j} in [set(s) for s in members]:
+            together = frozenset((*map(int, base), j))
+            if names[j] in inside or together in known:
                 continue
+            known.add(together)
             powers = x[j][:, None] ** np.arange(1, problem.degree + 1)
             change = powers @ slope[_columns(problem, j)] + 0.5 * np.diagonal(cross[j, :, j, :])
             members.append((*map(int, base), j))
@@ -122,13 +127,11 @@ def sizes_tried(problem: Powers) -> Grid:
     """Sizes x [F, COARSE], half the square each leaves over less its residual's, and inner products between them."""
     x = np.linspace(problem.low, problem.high, COARSE, axis=1)
     powers = x[:, :, None] ** np.arange(1, problem.degree + 1)
-    count = len(problem.families)
-    spread = np.zeros((count, COARSE, len(problem.gram)))
-    for m in range(count):
-        spread[m, :, _columns(problem, m)] = powers[m]
-    flat = spread.reshape(count * COARSE, -1)
-    cross = (flat @ problem.gram @ flat.T).reshape(count, COARSE, count, COARSE)
-    linear = (flat @ problem.gram[:, 0]).reshape(count, COARSE)
+    count, d = len(problem.families), problem.degree
+    inner = problem.gram[1:, 1:].reshape(count, d, count * d)
+    onto = (powers @ inner).reshape(count, COARSE, count, d).transpose(2, 3, 0, 1).reshape(count, d, -1)
+    cross = (powers @ onto).reshape(count, COARSE, count, COARSE)  # the same both ways round
+    linear = (powers @ problem.gram[1:, 0].reshape(count, d, 1))[..., 0]
     own = np.array([np.diagonal(cross[m, :, m, :]) for m in range(count)])
     return x, linear + 0.5 * own, cross
 
@@ -162,13 +165,13 @@ def descend(problem: Powers, members: Members, start: FloatArray) -> Modes:
 
 def _weights(x: FloatArray, degree: int) -> FloatArray:
     """[..., 1 + k degree] of sizes [..., k]."""
-    powers = x[..., None] ** np.arange(1, degree + 1)
+    powers = np.cumprod(np.broadcast_to(x[..., None], (*x.shape, degree)), axis=-1)
     return np.concatenate([np.ones((*x.shape[:-1], 1)), powers.reshape(*x.shape[:-1], -1)], axis=-1)
 
 
 def _cost(block: FloatArray, x: FloatArray, degree: int) -> FloatArray:
     w = _weights(x, degree)
-    return np.asarray(0.5 * np.einsum("pi,pij,pj->p", w, block, w))
+    return np.asarray(0.5 * np.einsum("pi,pi->p", (block @ w[..., None])[..., 0], w))
 
 
 def _derivatives(block: FloatArray, x: FloatArray, degree: int) -> tuple[FloatArray, FloatArray]:
@@ -178,8 +181,8 @@ def _derivatives(block: FloatArray, x: FloatArray, degree: int) -> tuple[FloatAr
     powers = np.arange(1, degree + 1)
     for m in range(k):
         change[:, m, 1 + m * degree : 1 + (m + 1) * degree] = powers * x[:, m, None] ** (powers - 1)
-    onto = np.einsum("pki,pij->pkj", change, block)
-    return np.einsum("pkj,pj->pk", onto, _weights(x, degree)), np.einsum("pki,pji->pkj", onto, change)
+    onto = change @ block
+    return (onto @ _weights(x, degree)[..., None])[..., 0], onto @ np.swapaxes(change, 1, 2)
 
 
 def _laplace(problem: Powers, members: Members, x: FloatArray, cost: FloatArray, information: FloatArray) -> FloatArray:
@@ -187,7 +190,7 @@ def _laplace(problem: Powers, members: Members, x: FloatArray, cost: FloatArray,
     log = 0.5 * problem.gram[0, 0] - cost
     left = information
     for m in range(members.shape[1]):
-        density = np.array([problem.density(int(i), at) for i, at in zip(members[:, m], x[:, m], strict=True)])
+        density = problem.density(members[:, m], x[:, m])
         width = np.sqrt(2.0 * np.pi / left[:, m, m])  # given the members before: determinants by elimination
         log = log + np.log(np.clip(density * width, 1e-12, 1.0))
         left = left - left[:, :, m, None] * left[:, m, None, :] / left[:, m, m, None, None]
@@ -204,8 +207,8 @@ def integrate(problem: Powers, modes: Modes, n: int) -> SetFit:
     x = np.concatenate([x[inside], modes.x[n][None]]) if not inside.any() else x[inside]
     index = np.concatenate([[0], *(np.arange(1 + m * problem.degree, 1 + (m + 1) * problem.degree) for m in members)])
     w = _weights(x, problem.degree)
-    cost = 0.5 * np.einsum("ni,ij,nj->n", w, problem.gram[np.ix_(index, index)], w)
-    prior = np.prod([problem.density(int(m), x[:, i]) for i, m in enumerate(members)], axis=0)
+    cost = 0.5 * np.einsum("ni,ni->n", w @ problem.gram[np.ix_(index, index)], w)
+    prior = np.prod(problem.density(members, x), axis=1)
     cell = float(np.prod(np.diag(root))) * (2.0 * SPAN / (POINTS[k] - 1)) ** k
     mass = np.exp(np.min(cost) - cost) * np.maximum(prior, 1e-300) * cell
     total = float(mass.sum())

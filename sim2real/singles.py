@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import BarycentricInterpolator
-from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
 from sim2real.candidates import Family
-from sim2real.sizes import piece_prior
+from sim2real.sizes import interpolated, piece_prior
 
 INDISTINGUISHABLE = 3.5  # whitened distance below which two explanations are told as one
 DETECTABLE = 3.5  # whitened distance from no gap at which an effect counts as shown
@@ -57,32 +55,26 @@ def fit_family(reduced: FloatArray, family: Family) -> EffectFit:
     prior = piece_prior(family, grid)
     step = np.gradient(grid)
     log_mass = gain + np.log(np.maximum(prior * step, 1e-300))
-    total = float(logsumexp(log_mass))
+    total = float(np.logaddexp.reduce(log_mass))
     mass = np.exp(log_mass - total)
     cumulative = np.cumsum(mass) - 0.5 * mass
     low, mid, high = (float(np.interp(q, cumulative, grid)) for q in (0.025, 0.5, 0.975))
-    weights = dict(zip(family.rows, _weights(family, np.array([mid]))[0], strict=True))
+    weights = dict(zip(family.rows, interpolated(family, np.array([mid]))[0], strict=True))
     misfit = float(reduced[0, 0] - 2.0 * np.max(gain))
     return EffectFit(family, total, mid, low, high, _distance(reduced, weights), _smallest(reduced, family), weights,
                      misfit)
 
 
-def _weights(family: Family, size: FloatArray) -> FloatArray:
-    """Interpolation weights [sizes, rows of the family]; the neutral row carries the rest."""
-    points = np.array([family.parameter.neutral, *family.nodes])
-    return np.asarray(BarycentricInterpolator(points, np.eye(len(points)))(size)[:, 1:])
-
-
 def _log_likelihood(block: FloatArray, family: Family, size: FloatArray) -> FloatArray:
-    w = np.column_stack([np.ones(len(size)), _weights(family, size)])
-    return np.asarray(-0.5 * np.einsum("si,ij,sj->s", w, block, w))
+    w = np.column_stack([np.ones(len(size)), interpolated(family, size)])
+    return np.asarray(-0.5 * np.einsum("si,si->s", w @ block, w))
 
 
 def _information(block: FloatArray, family: Family, size: float) -> float:
     """Square of the whitened signature per unit of size."""
     span = family.high - family.low
     ends = np.clip([size - 1e-3 * span, size + 1e-3 * span], family.low, family.high)
-    a, b = _weights(family, ends)
+    a, b = interpolated(family, ends)
     change = (b - a) / (ends[1] - ends[0])
     return float(change @ block[1:, 1:] @ change)
 
@@ -100,9 +92,9 @@ def _smallest(reduced: FloatArray, family: Family) -> float | None:
     sizes = sizes[(sizes >= family.low) & (sizes <= family.high)]  # of this piece of the range
     if not len(sizes):
         return None
-    w = _weights(family, sizes)
+    w = interpolated(family, sizes)
     rows = list(family.rows)
-    distance = np.sqrt(np.maximum(np.einsum("si,ij,sj->s", w, reduced[np.ix_(rows, rows)], w), 0.0))
+    distance = np.sqrt(np.maximum(np.einsum("si,si->s", w @ reduced[np.ix_(rows, rows)], w), 0.0))
     shown = np.flatnonzero(distance >= DETECTABLE)
     return float(sizes[shown[0]]) if len(shown) else None
 

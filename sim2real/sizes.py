@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from icing_env.effects import Parameter
 from icing_env.record import FloatArray
@@ -32,11 +34,22 @@ def size_prior(parameter: Parameter, size: FloatArray) -> FloatArray:
 
 def piece_prior(family: Family, size: FloatArray) -> FloatArray:
     """The same where a family is one piece of the range: it integrates to the piece's share of the whole."""
+    return np.asarray(size_prior(family.parameter, size) * _share(family))
+
+
+@cache
+def _share(family: Family) -> float:
+    """Prior probability of a piece of a parameter's range."""
     p = family.parameter
     whole = np.linspace(p.low, p.high, FINEST)
     inside = (whole >= family.low) & (whole <= family.high)
-    share = float(np.sum((size_prior(p, whole) * np.gradient(whole))[inside]))
-    return np.asarray(size_prior(p, size) * share)
+    return float(np.sum((size_prior(p, whole) * np.gradient(whole))[inside]))
+
+
+@cache
+def _tabulated(family: Family) -> FloatArray:
+    """Prior density at TABLE sizes between the ends of a piece."""
+    return piece_prior(family, np.linspace(family.low, family.high, TABLE))
 
 
 @dataclass(frozen=True)
@@ -67,10 +80,13 @@ class Powers:
         """Sizes in their own units."""
         return np.asarray(self.neutral[members] + self.reach[members] * x)
 
-    def density(self, member: int, x: FloatArray) -> FloatArray:
-        """Prior density of x; zero outside the range."""
-        grid = np.linspace(self.low[member], self.high[member], TABLE)
-        return np.interp(x, grid, self.prior[member], left=0.0, right=0.0)
+    def density(self, members: NDArray[np.intp], x: FloatArray) -> FloatArray:
+        """Prior density of x, of one member each; zero outside the range."""
+        low, high = self.low[members], self.high[members]
+        at = np.clip((x - low) / (high - low), 0.0, 1.0) * (TABLE - 1)
+        before = np.minimum(at.astype(np.intp), TABLE - 2)
+        found = self.prior[members, before] * (before + 1 - at) + self.prior[members, before + 1] * (at - before)
+        return np.where((x < low) | (x > high), 0.0, found)
 
 
 def in_powers(reduced: FloatArray, families: tuple[Family, ...]) -> Powers:
@@ -87,16 +103,24 @@ def in_powers(reduced: FloatArray, families: tuple[Family, ...]) -> Powers:
         change[first : first + len(x), list(family.rows)] = np.linalg.inv(powers)
     low = np.array([(f.low - f.parameter.neutral) for f in families]) / reach
     high = np.array([(f.high - f.parameter.neutral) for f in families]) / reach
-    prior = np.empty((len(families), TABLE))
-    for m, family in enumerate(families):
-        prior[m] = piece_prior(family, neutral[m] + reach[m] * np.linspace(low[m], high[m], TABLE)) * reach[m]
+    prior = np.array([_tabulated(f) for f in families]).reshape(-1, TABLE) * reach[:, None]
     return Powers(families, change @ reduced @ change.T, degree, neutral, reach, low, high, prior)
 
 
-def flown_weights(family: Family, size: float) -> dict[int, float]:
-    """Weights of the flown sizes' signatures at one size."""
+def interpolated(family: Family, sizes: FloatArray) -> FloatArray:
+    """Weights of the flown sizes' signatures [sizes, rows of the family] in those at other sizes."""
+    change, reach, degree = _through(family)
+    return np.asarray(((sizes - family.parameter.neutral) / reach)[:, None] ** np.arange(1, degree + 1) @ change)
+
+
+@cache
+def _through(family: Family) -> tuple[FloatArray, float, int]:
+    """Turns powers of x into weights of the sizes flown; what x counts in; and how many powers there are."""
     reach = max(abs(s - family.parameter.neutral) for s in family.nodes)
     x = (np.array(family.nodes) - family.parameter.neutral) / reach
-    at = ((size - family.parameter.neutral) / reach) ** np.arange(1, len(x) + 1)
-    return dict(zip(family.rows, (float(w) for w in at @ np.linalg.inv(x[:, None] ** np.arange(1, len(x) + 1))),
-                    strict=True))  # fmt: skip
+    return np.asarray(np.linalg.inv(x[:, None] ** np.arange(1, len(x) + 1)), np.float64), reach, len(x)
+
+
+def flown_weights(family: Family, size: float) -> dict[int, float]:
+    """Weights of the flown sizes' signatures at one size, by row."""
+    return dict(zip(family.rows, interpolated(family, np.array([size]))[0].tolist(), strict=True))

@@ -13,11 +13,11 @@ from sim2real.attribution import attribute, nuisance_mean, reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, shifted
 from sim2real.companions import leading
 from sim2real.courses import Courses
-from sim2real.evidence import SIGMAS, Evidence, choose_gain, gather, predicted
+from sim2real.evidence import SIGMAS, Evidence, choose_gain, gather
 from sim2real.hypotheses import Hypothesis, Posterior, doubted, leaving_out, normalised
 from sim2real.kalman import Gain, follow, gains
 from sim2real.points import Flying
-from sim2real.predictor import innovations
+from sim2real.predictor import innovations, predicted
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.refine import refine

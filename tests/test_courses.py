@@ -10,7 +10,7 @@ import pytest
 from icing_env import scenario
 from sim2real.candidates import bank
 from sim2real.courses import Courses, Remainder
-from sim2real.evidence import Evidence, compare, gather
+from sim2real.evidence import Evidence, flown, gather
 from sim2real.predictor import Push
 from sim2real.reconstruct import reconstruct
 from testbed.flight import fly
@@ -29,7 +29,7 @@ def remainder(evidence: Evidence, target: str, size: float, seed: int = 0) -> tu
     t = flight.time - flight.time[0]
     series = size * (np.tanh(t - 8.0) + np.sin(0.7 * t) ** 3)
     rows = np.repeat(flight.parameters, 2)
-    response = compare(flight, rows, (Push(1, target, series, False),), evidence.gain, evidence.factor, keep=[1]).rows
+    response = flown(flight, rows, (Push(1, target, series, False),), evidence.gain, evidence.factor, keep=[1]).rows
     noise = np.random.default_rng(seed).standard_normal(response.shape) * np.any(evidence.whitened != 0.0)
     row = response + noise
     return Remainder(row.T @ row, 1, [[row]], {}), float(np.sum(response**2))

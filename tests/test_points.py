@@ -11,7 +11,7 @@ from icing_env import scenario
 from icing_env.aircraft import load
 from sim2real.candidates import bank
 from sim2real.courses import Courses
-from sim2real.evidence import flown, gather, innovations, predicted
+from sim2real.evidence import gather
 from sim2real.points import Flying, bounded_step, rooms
 from sim2real.reconstruct import reconstruct
 from sim2real.references import Baseline
@@ -34,17 +34,15 @@ def flying() -> Flying:
     return Flying([flight], candidates, [evidence], baseline, 1.0, Courses([evidence], 1.0))
 
 
-def test_what_was_kept_of_the_terms_is_what_they_make_when_flown(flying):
+def test_what_was_kept_of_the_terms_is_their_response(flying):
     (evidence,), terms = flying.evidences, flying.candidates.terms
-    base = innovations(evidence.flight, evidence.flight.parameters, evidence.gain.K)[:, 0]
-    pushed = pushes(replace(evidence.flight, measured=predicted(evidence.flight, base)),
-                    [replace(term, row=1 + j) for j, term in enumerate(terms)])
-    again = flown(evidence.flight, np.repeat(evidence.flight.parameters, 1 + len(terms)), pushed, evidence.gain,
-                  evidence.factor, keep=range(1, 1 + len(terms))).rows  # fmt: skip
+    assert evidence.linear is not None
+    again = evidence.linear.respond(pushes(evidence.linear.flight, terms))
+    at = [j for j, term in enumerate(terms) if term.row in again.rows]
     (kept, inner), = flying.courses.of_terms(terms)
-    assert np.max(np.abs(again)) > 1.0
-    assert kept == pytest.approx(again, abs=1e-9)
-    assert inner == pytest.approx(again.T @ again, rel=1e-9, abs=1e-6)
+    assert len(at) > 100 and np.max(np.abs(again.values)) > 1.0
+    assert kept[:, at] == pytest.approx(again.values, abs=1e-12) and not np.delete(kept, at, axis=1).any()
+    assert inner[np.ix_(at, at)] == pytest.approx(again.values.T @ again.values, rel=1e-9, abs=1e-6)
 
 
 def test_a_point_with_slopes_from_elsewhere_costs_what_it_does_with_its_own(flying):
