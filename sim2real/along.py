@@ -138,11 +138,11 @@ def correct(x: Any, phi: float, left: Any, measured: Any, stretch: Any, gain: An
         left[c] = measured[c] - left[c]
     for c in range(len(fed)):
         fed[c] = left[c]*stretch[c] if np.isfinite(measured[c]) else 0.0
-    for s in range(len(change)):
-        total = 0.0
-        for c in range(len(fed)):
-            total += gain[c, s]*fed[c]
-        change[s] = total
+    change[:] = 0.0
+    for c in range(len(fed)):
+        share = fed[c]
+        for s in range(len(change)):
+            change[s] += gain[c, s]*share
     for s in range(MOVED):
         x[X[s]] += change[s]
     turn(x, phi, change[MOVED], change[MOVED + 1])

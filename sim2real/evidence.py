@@ -20,7 +20,7 @@ from sim2real.candidates import Bank, parameter_rows
 from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR
 from sim2real.kalman import Gain, follow, gains
 from sim2real.paths import counted, path_gram, path_residuals
-from sim2real.predictor import Push, held, innovations, predicted
+from sim2real.predictor import Push, held, innovations, predicted, with_spare
 from sim2real.reconstruct import Reconstruction
 from sim2real.response import Filter, Responses
 from sim2real.terms import Term, pushes
@@ -98,7 +98,7 @@ def flown(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain:
     moved = flown_rows(flight, rows, {q.row for q in pushed})
     index = {row: i for i, row in enumerate([*moved, *linear.rows])}
     renamed = tuple(replace(q, row=index[q.row]) for q in pushed)
-    left = innovations(flight, rows[moved], gain.K, renamed)
+    left = with_spare(flight, rows[moved], gain.K, renamed)
     first = round(SETTLE / flight.dt)
     inner, samples = np.zeros((len(index), len(index))), 0
     whitened = np.zeros((len(left), len(MEASURED)))
@@ -106,7 +106,7 @@ def flown(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain:
     at = np.array([(i, index[row]) for i, row in enumerate(keep) if row in index], np.intp).reshape(-1, 2)
     for k in range(first, len(left), CHUNK):
         flat = np.empty((len(left[k : k + CHUNK]) * len(MEASURED), len(index)))
-        _departures(left[k : k + CHUNK], factor[k : k + CHUNK], FARTHEST, flat)
+        _departures(left[k : k + CHUNK], len(moved), factor[k : k + CHUNK], FARTHEST, flat)
         if linear.rows:
             flat[:, len(moved) :] = linear.values[(k - first) * len(MEASURED) :][: len(flat)]
         whitened[k : k + CHUNK] = flat[:, 0].reshape(-1, len(MEASURED))
@@ -172,15 +172,16 @@ def whiten(left: FloatArray, factor: FloatArray) -> FloatArray:
 
 
 @entry
-def _departures(left: Any, factor: Any, farthest: float, out: Any) -> None:
+def _departures(left: Any, count: int, factor: Any, farthest: float, out: Any) -> None:
     """The first row whitened as `whiten` does, and the others' departures from it, none beyond `farthest`.
 
     Args:
-        left: [N, rows, channels], nan where nothing was measured.
+        left: [N, rows or more, channels], nan where nothing was measured.
+        count: of the rows.
         factor: [N, channels, channels], lower triangles.
         out: [N x channels, rows].
     """
-    steps, count, channels = left.shape
+    steps, channels = left.shape[0], left.shape[2]
     known = np.empty((channels, count))
     for k in range(steps):
         for i in range(count):

@@ -191,12 +191,17 @@ def innovations(flight: Reconstruction, parameters: NDArray, gain: FloatArray,
         gain: K of a `Gain` [steps, states, fed-back channels], or one per row [n, ...]; the last step's goes on.
         pushes: generic discrepancies.
     """
+    return with_spare(flight, parameters, gain, pushes)[:, : len(parameters)]
+
+
+def with_spare(flight: Reconstruction, parameters: NDArray, gain: FloatArray,
+               pushes: tuple[Push, ...] = ()) -> FloatArray:
+    """The same, more rows behind those asked for where two or three beside full lanes would take longer than four."""
     count = len(parameters)
-    # two or three rows beside full lanes take longer than four
     spare = -count % QUICK if count % QUICK > 1 and gain.ndim == 3 else 0
     flown = Predictor(flight, np.take(parameters, [*range(count), *[count - 1] * spare]))
     flown.place(0)
-    return np.ascontiguousarray(flown.fly(len(flight.time) - 1, gain=gain, pushes=pushes)[:, :count])
+    return flown.fly(len(flight.time) - 1, gain=gain, pushes=pushes)
 
 
 def predicted(flight: Reconstruction, left: FloatArray) -> FloatArray:
