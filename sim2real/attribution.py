@@ -87,6 +87,31 @@ def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision
         noise: whitened square that noise alone would leave, if known to be less than the best explanation leaves.
     """
     reduced = reduce(gram, bank, precision)
+    fits, found = _known(reduced, bank, untestable)
+    found = [replace(h, form=_form(reduced, gram, bank, h.fit)) if h.effects else h for h in found]
+    found, unknown_fits = homes(found, fit_unknown(reduced, bank), float(reduced[0, 0]), gram)
+    least = min([h.left for h in found] + [u.left for u in unknown_fits] + [noise])
+    found = forgive(found, float(reduced[0, 0]), least)
+    for known in _leading(found):
+        at_home, beside_it = _with_unknown(reduced, gram, bank, known, unknown_fits)
+        found[found.index(known)] = replace(known, form=with_terms(known.form, at_home))
+        found += beside_it
+    kept = normalised(forgive(found, float(reduced[0, 0]), min(least, *(h.left for h in found))), 0.0)
+    return Posterior(kept, fits, unknown_fits, ambiguity(reduced, fits, _inclusion(kept)), reduced,
+                     raw=gram)
+
+
+def least_misfit(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision: FloatArray) -> float:
+    """Whitened square that the best of all explanations leaves over, none of them in another form."""
+    reduced = reduce(gram, bank, precision)
+    found, alone = _known(reduced, bank, untestable)[1], fit_unknown(reduced, bank)
+    beside_known = [h for known in _leading(found) for h in _with_unknown(reduced, gram, bank, known, alone)[1]]
+    return min([h.fit.misfit for h in found] + [u.misfit for u in alone]
+               + [h.unknown.misfit for h in beside_known if h.unknown])  # fmt: skip
+
+
+def _known(reduced: FloatArray, bank: Bank, untestable: Sequence[str]) -> tuple[dict[str, EffectFit], list[Hypothesis]]:
+    """Every effect by itself; and no gap, single effects, pairs and triples as the library has them."""
     by_family = {f: fit_family(reduced, f) for f in bank.families if f.effect.name not in untestable}
     names = list(dict.fromkeys(f.effect.name for f in by_family))
     alternatives = {n: [e for f, e in by_family.items() if f.effect.name == n] for n in names}
@@ -97,22 +122,14 @@ def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision
         parameters = len({e.family.parameter.name for e in own})  # of equal prior; pieces of a range share one
         log = float(np.logaddexp.reduce([e.log_evidence for e in own]) - np.log(parameters))
         found.append(Hypothesis(_alone(fits[name]), None, single, log))
-    found += _several(reduced, bank, [i for i, f in enumerate(bank.families) if f in by_family])
-    found = [replace(h, form=_form(reduced, gram, bank, h.fit)) if h.effects else h for h in found]
-    found, unknown_fits = homes(found, fit_unknown(reduced, bank), float(reduced[0, 0]), gram)
-    least = min([h.left for h in found] + [u.left for u in unknown_fits] + [noise])
-    found = forgive(found, float(reduced[0, 0]), least)
+    return fits, found + _several(reduced, bank, [i for i, f in enumerate(bank.families) if f in by_family])
+
+
+def _leading(found: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Sets that something unknown is tried beside, nothing at all among them."""
     few = [h for h in found if len(h.effects) <= MOST_BESIDE]
     leading = sorted(few, key=lambda h: -h.log_posterior)[:BESIDE]
-    if found[0] not in leading:
-        leading.append(found[0])
-    for known in leading:
-        at_home, beside_it = _with_unknown(reduced, gram, bank, known, unknown_fits)
-        found[found.index(known)] = replace(known, form=with_terms(known.form, at_home))
-        found += beside_it
-    kept = normalised(forgive(found, float(reduced[0, 0]), min(least, *(h.left for h in found))), 0.0)
-    return Posterior(kept, fits, unknown_fits, ambiguity(reduced, fits, _inclusion(kept)), reduced,
-                     raw=gram)
+    return leading if found[0] in leading else [*leading, found[0]]
 
 
 def _best(own: Sequence[EffectFit]) -> EffectFit:

@@ -123,12 +123,6 @@ class Posterior:
         """The most probable set that holds an effect."""
         return next(h.fit for h in self.hypotheses if name in h.effects)
 
-    @property
-    def least_misfit(self) -> float:
-        """Whitened square that the best of all explanations leaves over."""
-        return min([h.unknown.misfit if h.unknown else h.fit.misfit for h in self.hypotheses]
-                   + [u.misfit for u in self.unknown_fits])  # fmt: skip
-
 
 def set_prior(names: Sequence[str], testable: int) -> float:
     """Log prior probability of a pair or triple of `testable` effects."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from icing_env import effects
 from icing_env.record import FloatArray
-from sim2real.attribution import attribute, nuisance_mean, reduce, with_prior
+from sim2real.attribution import attribute, least_misfit, nuisance_mean, reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, shifted
 from sim2real.companions import leading
 from sim2real.courses import Courses
@@ -221,14 +221,15 @@ def weigh(evidences: Sequence[Evidence], candidates: Bank, untestable: dict[str,
     """
     data, nothing = total(evidences), np.zeros_like(baseline.precision)
 
-    def posterior_of(tempering: float) -> Posterior:
-        gram = with_prior(data / tempering, candidates, baseline.precision, centre)
-        noise = sum(e.samples for e in evidences) / tempering if tempering > 1.0 else np.inf
-        return replace(attribute(gram, candidates, tuple(untestable), nothing, noise), tempering=tempering)
+    def tempered(by: float) -> FloatArray:
+        return with_prior(data / by, candidates, baseline.precision, centre)
 
-    posterior = posterior_of(tempering or 1.0)
-    if tempering is None and (found := temper(posterior.least_misfit, evidences)) > 1.0:
-        posterior = posterior_of(found)
+    if tempering is None:
+        left = least_misfit(tempered(1.0), candidates, tuple(untestable), nothing)
+        tempering = max(temper(left, evidences), 1.0)
+    noise = sum(e.samples for e in evidences) / tempering if tempering > 1.0 else np.inf
+    posterior = replace(attribute(tempered(tempering), candidates, tuple(untestable), nothing, noise),
+                        tempering=tempering)
     quiet = [name for name, found in posterior.fits.items() if found.smallest is None]
     for name in quiet:
         untestable[name] = "no excitation: these records would not show it anywhere in its range"
