@@ -8,22 +8,25 @@ not recorded too; else where it was recorded, noise and all.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
+from scipy.stats import chi2
 
 from icing_env.record import FloatArray
 from sim2real.channels import SURFACES
 from sim2real.paths import LAGS, UNFILTERED, follow, spread
 from sim2real.reconstruct import Reconstruction
 
-PLACED = 3e-5  # rad, what such a law leaves (assumed: a position's noise over the root of the samples behind a term)
+PLACED = 3e-5  # rad, what a fitted law leaves (assumed: a position's noise over the root of the samples behind a term)
+EXACT = 3e-6  # rad, the same of a law of which nothing but the lag is fitted (assumed)
 DRIFTS = 6  # cosines over a record that a law's shift may take
 SCALES = (5, 25, 100)  # samples over which what is left has to average out as white noise does
 SHORTEST, FINE = 1e-3, 1e-4  # s: least lag, and how finely it is found
-CHANCE = 4.0  # deviations of a mean square by chance that still pass for white
+CHANCE, SURE = 1e-5, 1.05  # of white noise not to pass for it; what the noise itself may be off by (squared)
 
 
 def placed(flight: Reconstruction) -> Reconstruction:
@@ -36,37 +39,58 @@ def placed(flight: Reconstruction) -> Reconstruction:
             continue  # not recorded, one or the other
         law = _law(flight, command, surface)
         if law is not None:
-            controls[surface], noise[j] = law, PLACED
+            controls[surface], noise[j] = law
     return replace(flight, controls=controls, surface_noise=noise)
 
 
-def _law(flight: Reconstruction, command: FloatArray, surface: str) -> FloatArray | None:
-    """Positions [N] before the recording's low pass, as the command makes them; None if they were not those."""
+def _law(flight: Reconstruction, command: FloatArray, surface: str) -> tuple[FloatArray, float] | None:
+    """Positions [N] before the recording's low pass, as the command makes them, and how well they are known.
+
+    The simplest law that says it: the published actuator, the same at another lag, geared and shifted, bent and
+    drifting too. Every number fitted costs the logarithm of the samples (Schwarz, Annals of Statistics 6, 1978), for it
+    is fitted to noise: a shift of 4e-5 rad of an aileron, held for 40 s, is a rolling moment that everybody can see.
+    """
     good, published = np.isfinite(flight.positions[surface]), float(flight.parameters[f"{surface}_lag"][0])
-    recorded = flight.positions[surface][good]
+    recorded, n = flight.positions[surface][good], int(np.count_nonzero(good))
 
     def behind(lag: float, filtered: bool = True) -> FloatArray:
         row = flight.parameters.copy()
         row[f"{surface}_lag"] = lag
         if not filtered:
             row["filter_frequency"] = UNFILTERED
-        return _basis(follow(command, recorded[0], row, surface, flight.dt)[:, 0])
+        return _basis(follow(command, command[0], row, surface, flight.dt)[:, 0])
 
-    def left(lag: float) -> FloatArray:
+    def weights(lag: float, terms: int) -> FloatArray:
+        """Of the basis' first terms; the position itself where none is fitted."""
         basis = behind(lag)[good]
-        return np.asarray(recorded - basis @ np.linalg.lstsq(basis, recorded, rcond=None)[0])
+        out = np.eye(basis.shape[1])[0]
+        if terms:
+            out = np.zeros(basis.shape[1])
+            out[:terms] = np.linalg.lstsq(basis[:, :terms], recorded, rcond=None)[0]
+        return out
 
-    def square(lag: float) -> float:
-        return float(np.sum(left(lag) ** 2))
+    def left(lag: float, terms: int) -> FloatArray:
+        return np.asarray(recorded - behind(lag)[good] @ weights(lag, terms))
 
-    lags = np.unique(np.maximum(published + LAGS, SHORTEST))
-    k = int(np.argmin([square(lag) for lag in lags]))
-    near = (lags[max(k - 1, 0)], lags[min(k + 1, len(lags) - 1)])
-    lag = float(minimize_scalar(square, bounds=near, method="bounded", options={"xatol": FINE}).x)
-    if not _white(left(lag)):
+    def square(lag: float, terms: int) -> float:
+        return float(np.sum(left(lag, terms) ** 2))
+
+    every = behind(published).shape[1]
+    laws = [(published, 0, 0), *((_lag(square, terms, published), terms, terms + 1) for terms in (0, 2, every))]
+    noise = max(spread(left(laws[-1][0], every)), 1e-9)
+    white = [law for law in laws if _white(left(*law[:2]))]
+    if not white:
         return None
-    weights = np.linalg.lstsq(behind(lag)[good], recorded, rcond=None)[0]
-    return np.asarray(behind(lag, filtered=False) @ weights)
+    lag, terms, _ = min(white, key=lambda law: square(*law[:2]) / noise**2 + law[2] * np.log(n))
+    return np.asarray(behind(lag, filtered=False) @ weights(lag, terms)), PLACED if terms else EXACT
+
+
+def _lag(square: Callable[[float, int], float], terms: int, published: float) -> float:
+    """The lag that leaves least."""
+    lags = np.unique(np.maximum(published + LAGS, SHORTEST))
+    k = int(np.argmin([square(lag, terms) for lag in lags]))
+    near = (lags[max(k - 1, 0)], lags[min(k + 1, len(lags) - 1)])
+    return float(minimize_scalar(square, bounds=near, args=(terms,), method="bounded", options={"xatol": FINE}).x)
 
 
 def _basis(position: FloatArray) -> FloatArray:
@@ -74,7 +98,7 @@ def _basis(position: FloatArray) -> FloatArray:
     n = len(position)
     slow = np.cos(np.pi * np.arange(DRIFTS + 1) * (np.arange(n)[:, None] + 0.5) / n)
     rate = np.gradient(position)
-    return np.column_stack([position, position**3, rate, np.gradient(rate), slow])
+    return np.column_stack([position, slow[:, 0], position**3, rate, np.gradient(rate), slow[:, 1:]])
 
 
 def _white(left: NDArray) -> bool:
@@ -84,6 +108,6 @@ def _white(left: NDArray) -> bool:
         if (count := len(left) // m) == 0:
             continue  # a short record
         means = left[: count * m].reshape(count, m).mean(axis=1)
-        if np.mean(means**2) * m > square * (1.0 + CHANCE * np.sqrt(2.0 / count)):
+        if np.mean(means**2) * m > SURE * square * chi2.ppf(1.0 - CHANCE, count) / count:
             return False
     return True
