@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from icing_env.record import FloatArray
+from sim2real.any_course import with_courses
 from sim2real.candidates import NUISANCE_STEP, Bank
 from sim2real.form import Form, may_bend, own_terms, room, shares, split, squares, with_terms
 from sim2real.generic import UnknownFit, beside, fit_unknown
@@ -76,7 +77,7 @@ def with_prior(gram: FloatArray, bank: Bank, precision: FloatArray, centre: Floa
 
 
 def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision: FloatArray | None = None,
-              noise: float = np.inf) -> Posterior:
+              noise: float = np.inf, courses: Sequence[UnknownFit] = ()) -> Posterior:
     """Posterior over no gap, sets of effects, and the unknown alone or beside them.
 
     Args:
@@ -85,11 +86,12 @@ def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision
         untestable: effects left out.
         precision: prior precision of the nuisances; identity if omitted.
         noise: whitened square that noise alone would leave, if known to be less than the best explanation leaves.
+        courses: `course_fits` of what the model leaves.
     """
     reduced = reduce(gram, bank, precision)
     fits, found = _known(reduced, bank, untestable)
     found = [replace(h, form=_form(reduced, gram, bank, h.fit)) if h.effects else h for h in found]
-    found, unknown_fits = homes(found, fit_unknown(reduced, bank), float(reduced[0, 0]), gram)
+    found, unknown_fits = homes(found, with_courses(fit_unknown(reduced, bank), courses), float(reduced[0, 0]), gram)
     least = min([h.left for h in found] + [u.left for u in unknown_fits] + [noise])
     found = forgive(found, float(reduced[0, 0]), least)
     for known in _leading(found):
@@ -98,7 +100,7 @@ def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision
         found += beside_it
     kept = normalised(forgive(found, float(reduced[0, 0]), min(least, *(h.left for h in found))), 0.0)
     return Posterior(kept, fits, unknown_fits, ambiguity(reduced, fits, _inclusion(kept)), reduced,
-                     raw=gram)
+                     raw=gram, courses=tuple(courses))
 
 
 def least_misfit(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision: FloatArray) -> float:

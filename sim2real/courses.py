@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -60,25 +61,33 @@ class Freed:
 class Course:
     """Free courses of time along one record, made when they are first asked for."""
 
-    def __init__(self, evidence: Evidence, tempering: float) -> None:
+    def __init__(self, evidence: Evidence) -> None:
         if evidence.linear is None:
             raise ValueError("candidates were not flown along this record")
-        self.about, self.tempering = evidence.linear, tempering
+        self.evidence, self.about = evidence, evidence.linear
         self._rows: dict[str, FloatArray] = {}
         self._inner: dict[tuple[str, str], FloatArray] = {}
-        self._freed: dict[tuple[str, ...], Freed] = {}
+        self._freed: dict[tuple[tuple[str, ...], float], Freed] = {}
         self._onto: dict[tuple[str, int], tuple[FloatArray, FloatArray]] = {}
+
+    @cached_property
+    def model(self) -> FloatArray:
+        """What the model leaves of the record [N x channels, 1]."""
+        return self.evidence.whitened[self.about.first :].reshape(-1, 1)
 
     def pushes(self, terms: Sequence[Term]) -> tuple[Push, ...]:
         """Time courses of generic terms along the record as the model predicts it."""
         return pushes(self.about.flight, terms)
 
-    def rows(self, component: str) -> FloatArray:
+    def rows(self, component: str, keep: bool = True) -> FloatArray:
         """What hats at a component make of the record [N x channels, knots]."""
-        if component not in self._rows:
-            hats = at_any_time(self.about.flight, component, 0)
-            self._rows[component] = self.about.respond(self.pushes(hats)).values
-        return self._rows[component]
+        if component in self._rows:
+            return self._rows[component]
+        hats = at_any_time(self.about.flight, component, 0)
+        made = self.about.respond(self.pushes(hats)).values
+        if keep:
+            self._rows[component] = made
+        return made
 
     def inner(self, one: str, other: str) -> FloatArray:
         """Inner products of the hats at two components."""
@@ -88,22 +97,27 @@ class Course:
             self._inner[one, other] = self.rows(one).T @ self.rows(other)
         return self._inner[one, other]
 
-    def freed(self, names: tuple[str, ...]) -> Freed:
+    def freed(self, names: tuple[str, ...], tempering: float) -> Freed:
         """Free courses at components that are no paths."""
-        if names not in self._freed:
-            inner = np.block([[self.inner(one, other) for other in names] for one in names]) / self.tempering
+        if (names, tempering) not in self._freed:
+            inner = np.block([[self.inner(one, other) for other in names] for one in names]) / tempering
             inverse = np.asarray(np.linalg.inv(inner + np.eye(len(inner))), np.float64)
-            self._freed[names] = Freed(inverse, float(np.sum(inverse * inner)))
-        return self._freed[names]
+            self._freed[names, tempering] = Freed(inverse, float(np.sum(inverse * inner)))
+        return self._freed[names, tempering]
 
-    def taken(self, names: tuple[str, ...], parts: Sequence[FloatArray], again: bool = True) -> FloatArray:
+    def taken(self, names: tuple[str, ...], parts: Sequence[FloatArray], tempering: float,
+              again: bool = True) -> FloatArray:
         """What they explain of the inner products (tempered) of other rows, in parts side by side [rows, rows].
 
         Args:
             again: whether the same parts will be asked for again.
         """
-        cross = np.block([[self._cross(name, part, again) for part in parts] for name in names]) / self.tempering
-        return np.asarray(cross.T @ self.freed(names).inverse @ cross)
+        cross = np.concatenate([self.onto(name, parts, again) for name in names]) / tempering
+        return np.asarray(cross.T @ self.freed(names, tempering).inverse @ cross)
+
+    def onto(self, name: str, parts: Sequence[FloatArray], again: bool = True) -> FloatArray:
+        """Inner products of the hats at a component with other rows [knots, rows]."""
+        return np.concatenate([self._cross(name, part, again) for part in parts], axis=1)
 
     def _cross(self, name: str, part: FloatArray, again: bool) -> FloatArray:
         """Inner products of the hats at a component with other rows."""
@@ -117,16 +131,15 @@ class Course:
 class Courses:
     """Generic terms and free courses along some records."""
 
-    def __init__(self, evidences: Sequence[Evidence], tempering: float) -> None:
-        self.evidences = evidences
-        self.along = [Course(e, tempering) for e in evidences]
+    def __init__(self, along: Sequence[Course], tempering: float) -> None:
+        self.along, self.tempering = along, tempering
         self._terms: list[tuple[FloatArray, FloatArray]] = []
         self._pushed: list[tuple[Push, ...]] = []
 
     def pushed(self, terms: Sequence[Term], weights: Mapping[int, float], rows: int) -> list[tuple[Push, ...]]:
         """What generic terms of given weights together push in every record, for each of some rows."""
         if not weights:
-            return [()] * len(self.evidences)
+            return [()] * len(self.along)
         if not self._pushed:
             self._pushed = [course.pushes(terms) for course in self.along]
         return [_together(pushed, weights, rows) for pushed in self._pushed]
@@ -134,7 +147,8 @@ class Courses:
     def of_terms(self, terms: Sequence[Term]) -> list[tuple[FloatArray, FloatArray]]:
         """What generic terms make of every record [N x channels, terms], and its inner products; always the same."""
         if not self._terms:
-            own = [e.rows[:, e.rows.shape[1] - len(terms) :] for e in self.evidences]
+            made = [course.evidence.rows for course in self.along]
+            own = [rows[:, rows.shape[1] - len(terms) :] for rows in made]
             self._terms = [(rows, rows.T @ rows) for rows in own]
         return self._terms
 
@@ -143,10 +157,9 @@ class Courses:
         taken = sum(left.excess.get(component, 0.0) for component in components)
         gram = before = left.gram[: left.first, : left.first]
         if names := in_time(components):
-            for course, less in zip(self.along, each(lambda c, rows: c.taken(names, rows), self.along, left.rows),
-                                    strict=True):
-                gram = gram - less
-                taken -= course.freed(names).chance
+            less = each(lambda course, rows: course.taken(names, rows, self.tempering), self.along, left.rows)
+            gram = gram - sum(less)
+            taken -= sum(course.freed(names, self.tempering).chance for course in self.along)
         by_courses = float(projected(before, left.first, left.held)[0, 0]
                            - projected(gram, left.first, left.held)[0, 0])
         return max(taken + (1.0 + BENT) * by_courses, 0.0)

@@ -82,6 +82,7 @@ class Posterior:
         tempering: what the evidence was divided by.
         raw: inner products of all rows, nuisances where they are.
         bare: whitened square that is left where the best flown set may do whatever it likes at home.
+        courses: free courses of time, by component.
         settled: nuisances [n] where the best flown set settled, if any was flown.
     """
 
@@ -94,6 +95,7 @@ class Posterior:
     raw: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     bare: float = np.inf
     settled: FloatArray | None = None
+    courses: tuple[UnknownFit, ...] = ()
 
     @property
     def none(self) -> float:

@@ -20,8 +20,8 @@ from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR, SURFACES
 from sim2real.predictor import TANGENT, Predictor
 from sim2real.reconstruct import Reconstruction
 
-# What disturbs the states beside gusts, per square root of second (assumed): little, since what is disturbed is forgotten,
-# steady moments first. Of the velocities a share of the gust intensity: gusts go in straight lines between samples here.
+# What disturbs the states beside gusts, per square root of second (assumed): little, since what is disturbed is
+# forgotten, steady moments first. Of the velocities a share of the gusts, which go in straight lines between samples.
 WALK = {"p": 3e-5, "q": 3e-5, "r": 3e-5, "altitude": 5e-3, "phi": 2e-5, "theta": 2e-5}
 WALK_OF_GUST, WALK_IN_CALM = 0.02, 0.003  # per m/s of sigma_w, and m/s: velocities
 TRANSIENT = 10.0  # s with gains of their own after the start

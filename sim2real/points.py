@@ -213,7 +213,7 @@ class Flying:
             rows = parameter_rows(replace(flight, parameters=at), only)
             found = compare(flight, rows, evidence.gain, evidence.factor, keep=range(len(rows)))
             own = path_gram(of_paths(flight, home), rows, (), round(SETTLE / flight.dt)) / self.tempering
-            courses = course.taken(names, [found.rows], again=False) if names else 0.0
+            courses = course.taken(names, [found.rows], self.tempering, again=False) if names else 0.0
             return found.gram / self.tempering, own + courses
 
         total, taken = np.sum(each(of_record, self.flights, self.evidences, self.courses.along), axis=0)

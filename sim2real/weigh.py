@@ -9,10 +9,11 @@ import numpy as np
 
 from icing_env import effects
 from icing_env.record import FloatArray
+from sim2real.any_course import course_fits
 from sim2real.attribution import attribute, least_misfit, nuisance_mean, reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, shifted
 from sim2real.companions import leading
-from sim2real.courses import Courses
+from sim2real.courses import Course, Courses
 from sim2real.evidence import SIGMAS, Evidence, choose_gain, gather
 from sim2real.hypotheses import Hypothesis, Posterior, doubted, leaving_out, normalised
 from sim2real.kalman import Gain, follow, gains
@@ -69,6 +70,7 @@ class _Weighing:
     """
 
     evidences: list[Evidence]
+    along: list[Course]
     posterior: Posterior
 
     def __init__(self, flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline,
@@ -81,11 +83,12 @@ class _Weighing:
     def gather(self, known: Sequence[Gain] | None, tempering: float | None = None) -> None:
         """Fly the variants about the centre, with gains (and tempering) where known, and weigh what they say."""
         self.evidences = gather_about(self.flights, self.candidates, self.centre, known)
+        self.along = [Course(e) for e in self.evidences]
         self._weigh(tempering)
 
     def _weigh(self, tempering: float | None) -> None:
         self.quiet = dict(self.untestable)
-        self.posterior = weigh(self.evidences, self.candidates, self.quiet, self.baseline, self.centre, tempering)
+        self.posterior = weigh(self.along, self.candidates, self.quiet, self.baseline, self.centre, tempering)
 
     def _gram(self) -> FloatArray:
         """Inner products of all records, tempered, the nuisances' prior among them."""
@@ -98,7 +101,7 @@ class _Weighing:
 
     def _flying(self) -> Flying:
         t = self.posterior.tempering
-        return Flying(self.flights, self.candidates, self.evidences, self.baseline, t, Courses(self.evidences, t))
+        return Flying(self.flights, self.candidates, self.evidences, self.baseline, t, Courses(self.along, t))
 
     def moved(self) -> bool:
         """Move the centre to where the likeliest explanation has it, if that or its gains are far from what was flown.
@@ -208,17 +211,18 @@ def total(evidences: Sequence[Evidence]) -> FloatArray:
     return np.asarray(np.sum([e.gram for e in evidences], axis=0))
 
 
-def weigh(evidences: Sequence[Evidence], candidates: Bank, untestable: dict[str, str], baseline: Baseline,
+def weigh(along: Sequence[Course], candidates: Bank, untestable: dict[str, str], baseline: Baseline,
           centre: FloatArray, tempering: float | None = None) -> Posterior:
     """Posterior of all records together; effects whose whole range would not show are added to `untestable`.
 
     Args:
-        evidences, candidates: what was flown.
+        along, candidates: what was flown along every record.
         untestable: effects left out, with the reason; changed in place.
         baseline: the model and its precision.
         centre: nuisances [n] by which the flown model had been moved.
         tempering: of the evidence; as what is left says if omitted.
     """
+    evidences = [course.evidence for course in along]
     data, nothing = total(evidences), np.zeros_like(baseline.precision)
 
     def tempered(by: float) -> FloatArray:
@@ -228,8 +232,10 @@ def weigh(evidences: Sequence[Evidence], candidates: Bank, untestable: dict[str,
         left = least_misfit(tempered(1.0), candidates, tuple(untestable), nothing)
         tempering = max(temper(left, evidences), 1.0)
     noise = sum(e.samples for e in evidences) / tempering if tempering > 1.0 else np.inf
-    posterior = replace(attribute(tempered(tempering), candidates, tuple(untestable), nothing, noise),
-                        tempering=tempering)
+    gram, first = tempered(tempering), 1 + len(candidates.nuisances)
+    parts = [[course.model, course.evidence.rows[:, : first - 1]] for course in along]
+    free = course_fits(Courses(along, tempering), parts, gram[:first, :first])
+    posterior = replace(attribute(gram, candidates, tuple(untestable), nothing, noise, free), tempering=tempering)
     quiet = [name for name, found in posterior.fits.items() if found.smallest is None]
     for name in quiet:
         untestable[name] = "no excitation: these records would not show it anywhere in its range"

@@ -9,7 +9,7 @@ import pytest
 
 from icing_env import scenario
 from sim2real.candidates import bank
-from sim2real.courses import Courses, Remainder
+from sim2real.courses import Course, Courses, Remainder
 from sim2real.evidence import Evidence, flown, gather
 from sim2real.predictor import Push
 from sim2real.reconstruct import reconstruct
@@ -40,7 +40,7 @@ def remainder(evidence: Evidence, target: str, size: float, seed: int = 0) -> tu
 ])  # fmt: skip
 def test_a_course_takes_what_enters_at_its_component(evidence, target, home, elsewhere):
     left, square = remainder(evidence, target, 0.1 if target == "w" else 0.01)
-    courses = Courses([evidence], 1.0)
+    courses = Courses([Course(evidence)], 1.0)
     assert square > 200.0
     assert courses.free(left, {home}) == pytest.approx(square, abs=0.05 * square + 40.0)
     assert courses.free(left, {elsewhere}) < 0.1 * square + 40.0
@@ -48,7 +48,7 @@ def test_a_course_takes_what_enters_at_its_component(evidence, target, home, els
 
 
 def test_noise_alone_gives_a_course_little(evidence):
-    courses = Courses([evidence], 1.0)
+    courses = Courses([Course(evidence)], 1.0)
     found = [courses.free(remainder(evidence, "p", 0.0, seed)[0], {"rolling_moment"}) for seed in range(20)]
     assert np.mean(found) < 15.0 and max(found) < 60.0
 
@@ -56,4 +56,4 @@ def test_noise_alone_gives_a_course_little(evidence):
 def test_a_path_has_no_courses_but_its_excess(evidence):
     left, _ = remainder(evidence, "p", 0.01)
     held = Remainder(left.gram, left.first, left.rows, {"elevator_path": 77.0})
-    assert Courses([evidence], 1.0).free(held, {"elevator_path"}) == 77.0
+    assert Courses([Course(evidence)], 1.0).free(held, {"elevator_path"}) == 77.0

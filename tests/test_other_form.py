@@ -14,7 +14,7 @@ from icing_env.aircraft import load
 from icing_env.types import DERIVATIVE_NAMES
 from sim2real.bends import bends, changes
 from sim2real.candidates import bank
-from sim2real.courses import Courses, projected
+from sim2real.courses import Course, Courses, projected
 from sim2real.evidence import gather
 from sim2real.generic import fit_unknown
 from sim2real.home_terms import gain
@@ -154,7 +154,7 @@ def bent() -> tuple[Flying, Bent]:
     candidates = replace(bank(), families=())
     evidence = gather(flight, candidates)
     baseline = Baseline(load(), np.eye(len(candidates.nuisances)))
-    flying = Flying([flight], candidates, [evidence], baseline, 1.0, Courses([evidence], 1.0))
+    flying = Flying([flight], candidates, [evidence], baseline, 1.0, Courses([Course(evidence)], 1.0))
     nothing = SetFit(misfit=float(evidence.gram[0, 0]))
     point = flying.settle(nothing, np.zeros(len(candidates.nuisances)))
     return flying, Bent(point, flying.left_over(nothing, point))

@@ -10,7 +10,7 @@ import pytest
 from icing_env import scenario
 from icing_env.aircraft import load
 from sim2real.candidates import bank
-from sim2real.courses import Courses
+from sim2real.courses import Course, Courses
 from sim2real.evidence import gather
 from sim2real.points import Flying, bounded_step, rooms
 from sim2real.reconstruct import reconstruct
@@ -31,7 +31,7 @@ def flying() -> Flying:
     candidates = replace(bank(), families=())
     evidence = gather(flight, candidates)
     baseline = Baseline(load(), np.eye(len(candidates.nuisances)))
-    return Flying([flight], candidates, [evidence], baseline, 1.0, Courses([evidence], 1.0))
+    return Flying([flight], candidates, [evidence], baseline, 1.0, Courses([Course(evidence)], 1.0))
 
 
 def test_what_was_kept_of_the_terms_is_their_response(flying):

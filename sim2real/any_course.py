@@ -1,0 +1,81 @@
+"""Something unknown that no generic term follows: a free course of time at one component, of unknown size.
+
+Its hats (`sim2real.courses`) have heights with a Gaussian prior, alike and independent, of one of several sizes: the
+evidence is in closed form, and what so many heights take by luck they pay for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from icing_env.record import FloatArray
+from sim2real.courses import Course, Courses, in_time
+from sim2real.generic import UnknownFit
+from sim2real.terms import BEYOND, GENERIC
+
+SIZES = (0.003, 0.01, 0.03, 0.1, 0.3)  # standard deviations of the heights, in units of a generic coefficient (assumed)
+SHARE = 1.0 / 3.0  # prior share of what is unknown at a component that generic terms do not follow (assumed)
+PLACES = in_time({component for component, _, _ in (*GENERIC, *BEYOND)})
+
+
+def course_fits(courses: Courses, parts: Sequence[Sequence[FloatArray]], gram: FloatArray, held: Collection[int] = (),
+                places: Collection[str] = PLACES) -> list[UnknownFit]:
+    """Evidence of a free course at each of some components over what is left without.
+
+    Args:
+        parts: of every record, what is left and what else may give way [N x channels, rows], in parts side by side.
+        gram: inner products of these rows [rows, rows], tempered, priors among them.
+        held: rows that give way no more.
+        places: components.
+    """
+    gone = [j for j in range(1, len(gram)) if j not in held]
+    inverse = np.linalg.inv(gram[np.ix_(gone, gone)])
+    moved = inverse @ gram[gone, 0]
+    misfit, found = float(gram[0, 0] - gram[0, gone] @ moved), []
+    for component in places:
+        made = [_products(course, component, own) for course, own in zip(courses.along, parts, strict=True)]
+        inner = block_diag(*(one for one, _ in made)) / courses.tempering
+        onto = np.concatenate([other for _, other in made]) / courses.tempering
+        if np.max(np.diag(inner), initial=0.0) > 1e-9:
+            across = onto[:, gone]
+            found.append(_fit(component, inner - across @ inverse @ across.T, across @ moved - onto[:, 0], misfit))
+    return found
+
+
+def _products(course: Course, component: str, parts: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Inner products of a record's hats at a component with themselves and with other rows."""
+    rows = course.rows(component, keep=False)
+    return np.asarray(rows.T @ rows), np.concatenate([rows.T @ part for part in parts], axis=1)
+
+
+def _fit(component: str, inner: FloatArray, onto: FloatArray, misfit: float) -> UnknownFit:
+    """Heights of unknown size integrated out; luck taken out of what they leave."""
+    energy, axes = np.linalg.eigh(inner)
+    energy, along = np.maximum(energy, 0.0), axes.T @ onto
+    logs = []
+    for size in SIZES:
+        shown = size**2 * energy
+        logs.append(0.5 * float(np.sum(size**2 * along**2 / (1.0 + shown)) - np.sum(np.log1p(shown))))
+    best = SIZES[int(np.argmax(logs))]
+    heights = best**2 * along / (1.0 + best**2 * energy)
+    luck = float(np.sum(best**2 * energy / (1.0 + best**2 * energy)))
+    return UnknownFit(component, float(np.logaddexp.reduce(logs) - np.log(len(SIZES))),
+                      (("course", float(np.sqrt(np.mean(heights**2))), best),),
+                      misfit - max(float(along @ heights) - luck, 0.0), {})
+
+
+def with_courses(fits: Sequence[UnknownFit], courses: Sequence[UnknownFit]) -> list[UnknownFit]:
+    """Generic terms of every component, or a free course there: both counted, the likelier told."""
+    free, out = {u.component: u for u in courses}, []
+    for u in fits:
+        ways = [replace(u, log_evidence=u.log_evidence + float(np.log(1.0 - SHARE)))]
+        if u.component in free:
+            course = free[u.component]
+            ways.append(replace(course, log_evidence=course.log_evidence + float(np.log(SHARE))))
+        together = float(np.logaddexp.reduce([way.log_evidence for way in ways]))
+        out.append(replace(max(ways, key=lambda way: way.log_evidence), log_evidence=together))
+    return out
