@@ -15,10 +15,12 @@ from scipy.linalg import block_diag
 from icing_env.record import FloatArray
 from sim2real.courses import Course, Courses, in_time
 from sim2real.generic import UnknownFit
+from sim2real.side_by_side import each
 from sim2real.terms import BEYOND, GENERIC
 
 SIZES = (0.003, 0.01, 0.03, 0.1, 0.3)  # standard deviations of the heights, in units of a generic coefficient (assumed)
 SHARE = 1.0 / 3.0  # prior share of what is unknown at a component that generic terms do not follow (assumed)
+TOGETHER = 7  # components whose responses are computed at once
 PLACES = in_time({component for component, _, _ in (*GENERIC, *BEYOND)})
 
 
@@ -36,20 +38,24 @@ def course_fits(courses: Courses, parts: Sequence[Sequence[FloatArray]], gram: F
     inverse = np.linalg.inv(gram[np.ix_(gone, gone)])
     moved = inverse @ gram[gone, 0]
     misfit, found = float(gram[0, 0] - gram[0, gone] @ moved), []
-    for component in places:
-        made = [_products(course, component, own) for course, own in zip(courses.along, parts, strict=True)]
-        inner = block_diag(*(one for one, _ in made)) / courses.tempering
-        onto = np.concatenate([other for _, other in made]) / courses.tempering
+    made = each(lambda course, own: _products(course, sorted(places), own), courses.along, parts)
+    for component in sorted(places):
+        inner = block_diag(*(products[component][0] for products in made)) / courses.tempering
+        onto = np.concatenate([products[component][1] for products in made]) / courses.tempering
         if np.max(np.diag(inner), initial=0.0) > 1e-9:
             across = onto[:, gone]
             found.append(_fit(component, inner - across @ inverse @ across.T, across @ moved - onto[:, 0], misfit))
     return found
 
 
-def _products(course: Course, component: str, parts: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Inner products of a record's hats at a component with themselves and with other rows."""
-    rows = course.rows(component, keep=False)
-    return np.asarray(rows.T @ rows), np.concatenate([rows.T @ part for part in parts], axis=1)
+def _products(course: Course, places: Sequence[str], parts: Sequence[FloatArray]
+              ) -> dict[str, tuple[FloatArray, FloatArray]]:  # fmt: skip
+    """Inner products of a record's hats, at each component, with themselves and with other rows."""
+    found, other = {}, np.concatenate(parts, axis=1)
+    for k in range(0, len(places), TOGETHER):
+        for component, rows in course.made(places[k : k + TOGETHER]).items():
+            found[component] = np.asarray(rows.T @ rows), np.asarray(rows.T @ other)
+    return found
 
 
 def _fit(component: str, inner: FloatArray, onto: FloatArray, misfit: float) -> UnknownFit:

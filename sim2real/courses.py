@@ -79,15 +79,22 @@ class Course:
         """Time courses of generic terms along the record as the model predicts it."""
         return pushes(self.about.flight, terms)
 
-    def rows(self, component: str, keep: bool = True) -> FloatArray:
-        """What hats at a component make of the record [N x channels, knots]."""
-        if component in self._rows:
-            return self._rows[component]
-        hats = at_any_time(self.about.flight, component, 0)
-        made = self.about.respond(self.pushes(hats)).values
-        if keep:
-            self._rows[component] = made
-        return made
+    def rows(self, component: str) -> FloatArray:
+        """What hats at a component make of the record [N x channels, knots]; kept."""
+        if component not in self._rows:
+            self._rows |= self.made([component])
+        return self._rows[component]
+
+    def made(self, components: Sequence[str]) -> dict[str, FloatArray]:
+        """The same of several together, which is quicker; not kept."""
+        hats: list[Term] = []
+        columns = {}
+        for component in components:
+            own = at_any_time(self.about.flight, component, len(hats))
+            columns[component] = slice(len(hats), len(hats) + len(own))
+            hats += own
+        values = self.about.respond(self.pushes(hats)).values
+        return {component: values[:, at] for component, at in columns.items()}
 
     def inner(self, one: str, other: str) -> FloatArray:
         """Inner products of the hats at two components."""

@@ -21,9 +21,10 @@ from sim2real.predictor import TANGENT, Predictor
 from sim2real.reconstruct import Reconstruction
 
 # What disturbs the states beside gusts, per square root of second (assumed): little, since what is disturbed is
-# forgotten, steady moments first. Of the velocities a share of the gusts, which go in straight lines between samples.
-WALK = {"p": 3e-5, "q": 3e-5, "r": 3e-5, "altitude": 5e-3, "phi": 2e-5, "theta": 2e-5}
-WALK_OF_GUST, WALK_IN_CALM = 0.02, 0.003  # per m/s of sigma_w, and m/s: velocities
+# forgotten, steady moments first. Gusts go in straight lines between samples here, and meet the aircraft in one point
+# and its tail: a share of their intensity disturbs too (per m/s of sigma_w).
+WALK = {"u": 3e-3, "v": 3e-3, "w": 3e-3, "p": 3e-5, "q": 3e-5, "r": 3e-5, "altitude": 5e-3, "phi": 2e-5, "theta": 2e-5}
+WALK_OF_GUST = {"u": 0.04, "v": 0.04, "w": 0.04, "p": 1e-4, "q": 1e-4, "r": 1e-4}
 TRANSIENT = 10.0  # s with gains of their own after the start
 SPAN = 1.0  # s along a record that are flown as if at one condition
 ROUGH = 60  # steps after which a gust no longer shows in third differences
@@ -133,8 +134,7 @@ def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, 
         Qw: covariance of what drives the gusts.
         noise: variance of every fed-back channel's own noise.
     """
-    free = WALK | dict.fromkeys("uvw", max(WALK_OF_GUST * sigma, WALK_IN_CALM))
-    walk = np.array([free.get(name, 1e-6) for name in TANGENT]) ** 2 * flight.dt
+    walk = np.array([np.hypot(WALK.get(n, 1e-6), WALK_OF_GUST.get(n, 0.0) * sigma) for n in TANGENT]) ** 2 * flight.dt
     blank = np.array([not flight.has(name) for name in MEASURED[:FED_BACK]])
     rate = np.array([max(np.mean(np.isfinite(flight.measured[:, j])), 1e-3) for j in range(FED_BACK)])
     least = np.array([NOISE_FLOOR[name] for name in MEASURED[:FED_BACK]])
