@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from icing_env.record import FloatArray
-from sim2real.courses import Course, Courses, in_time
+from sim2real.courses import Course, Courses, Remainder, in_time
 from sim2real.generic import UnknownFit
 from sim2real.side_by_side import each
 from sim2real.terms import BEYOND, GENERIC
@@ -46,6 +46,11 @@ def course_fits(courses: Courses, parts: Sequence[Sequence[FloatArray]], gram: F
             across = onto[:, gone]
             found.append(_fit(component, inner - across @ inverse @ across.T, across @ moved - onto[:, 0], misfit))
     return found
+
+
+def beside(courses: Courses, left: Remainder, places: Collection[str]) -> list[UnknownFit]:
+    """The same of what a set leaves where it was flown."""
+    return course_fits(courses, left.rows, left.gram[: left.first, : left.first], left.held, in_time(places))
 
 
 def _products(course: Course, places: Sequence[str], parts: Sequence[FloatArray]

@@ -15,10 +15,10 @@ import numpy as np
 from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
-from sim2real.any_course import course_fits, with_courses
+from sim2real.any_course import beside, with_courses
 from sim2real.companions import companions, leading, together
 from sim2real.corrections import corrected, inherited
-from sim2real.courses import Remainder, in_time
+from sim2real.courses import Remainder
 from sim2real.form import (
     FORGIVEN,
     OTHER_FORM,
@@ -125,18 +125,13 @@ class _Search:
         h = corrected(h, self.points[i], self.linear)
         self.left[i] = self.flying.left_over(h.fit, self.points[i])
         left = self.left[i].reduced()
-        self.generic[i] = with_courses(self._fit_unknown(left), self._courses(h, self.left[i]))
+        places = home(h.effects) if h.effects else {u.component for u in self.linear.courses if u.log_evidence > 0.0}
+        self.generic[i] = with_courses(self._fit_unknown(left), beside(self.flying.courses, self.left[i], places))
         if h.effects:
             h = replace(h, form=self._form(i, h, left), instead=None)
         else:
             self.nothing = h.fit.misfit
         self.found[i] = h
-
-    def _courses(self, h: Hypothesis, left: Remainder) -> list[UnknownFit]:
-        """Free courses of time on what a set leaves: at its home, or without effects where the linear fit saw one."""
-        seen = {u.component for u in self.linear.courses if u.log_evidence > 0.0}
-        places = in_time(home(h.effects) if h.effects else seen)
-        return course_fits(self.flying.courses, left.rows, left.gram[: left.first, : left.first], left.held, places)
 
     def _form(self, i: int, h: Hypothesis, left: FloatArray) -> Form:
         """Another form of a flown set, itself flown where it takes much."""
