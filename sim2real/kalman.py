@@ -22,9 +22,9 @@ from sim2real.reconstruct import Reconstruction
 
 # What disturbs the states beside gusts, per square root of second (assumed): little, since what is disturbed is
 # forgotten, steady moments first. Gusts go in straight lines between samples here, and meet the aircraft in one point
-# and its tail: a share of their intensity disturbs too (per m/s of sigma_w).
+# and its tail: a share of their intensity disturbs too (per m/s of sigma_w; chosen on development cases).
 WALK = {"u": 3e-3, "v": 3e-3, "w": 3e-3, "p": 3e-5, "q": 3e-5, "r": 3e-5, "altitude": 5e-3, "phi": 2e-5, "theta": 2e-5}
-WALK_OF_GUST = {"u": 0.04, "v": 0.04, "w": 0.04, "p": 1e-4, "q": 1e-4, "r": 1e-4}
+WALK_OF_GUST = {"u": 0.04, "v": 0.04, "w": 0.04, "p": 2e-4, "q": 2e-4, "r": 2e-4, "phi": 1e-4, "theta": 1e-4}
 TRANSIENT = 10.0  # s with gains of their own after the start
 SPAN = 1.0  # s along a record that are flown as if at one condition
 ROUGH = 60  # steps after which a gust no longer shows in third differences

@@ -15,6 +15,7 @@ from sim2real.candidates import NUISANCE_STEP, Bank, shifted
 from sim2real.companions import leading
 from sim2real.courses import Course, Courses
 from sim2real.evidence import SIGMAS, Evidence, choose_gain, gather
+from sim2real.generic import UnknownFit
 from sim2real.hypotheses import Hypothesis, Posterior, doubted, leaving_out, normalised
 from sim2real.kalman import Gain, follow, gains
 from sim2real.points import Flying
@@ -53,6 +54,8 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
     if found.moved():
         progress("flying the variants again about the fitted model")
         found.gather(found.known)
+    progress("looking for what no generic term follows")
+    found.weigh_courses()
     untestable |= found.quiet
     if leading(found.posterior):
         progress("flying the leading explanations where they were fitted")
@@ -86,9 +89,15 @@ class _Weighing:
         self.along = [Course(e) for e in self.evidences]
         self._weigh(tempering)
 
-    def _weigh(self, tempering: float | None) -> None:
+    def weigh_courses(self) -> None:
+        """Weigh once more, free courses of time among what is unknown."""
+        t, first = self.posterior.tempering, 1 + len(self.candidates.nuisances)
+        parts = [[course.model, course.evidence.rows[:, : first - 1]] for course in self.along]
+        self._weigh(t, course_fits(Courses(self.along, t), parts, self._gram()[:first, :first]))
+
+    def _weigh(self, tempering: float | None, free: Sequence[UnknownFit] = ()) -> None:
         self.quiet = dict(self.untestable)
-        self.posterior = weigh(self.along, self.candidates, self.quiet, self.baseline, self.centre, tempering)
+        self.posterior = weigh(self.evidences, self.candidates, self.quiet, self.baseline, self.centre, tempering, free)
 
     def _gram(self) -> FloatArray:
         """Inner products of all records, tempered, the nuisances' prior among them."""
@@ -139,6 +148,7 @@ class _Weighing:
             self.gather(self.known, calm)
         else:
             self._weigh(calm)
+        self.weigh_courses()
         return True
 
 
@@ -211,18 +221,18 @@ def total(evidences: Sequence[Evidence]) -> FloatArray:
     return np.asarray(np.sum([e.gram for e in evidences], axis=0))
 
 
-def weigh(along: Sequence[Course], candidates: Bank, untestable: dict[str, str], baseline: Baseline,
-          centre: FloatArray, tempering: float | None = None) -> Posterior:
+def weigh(evidences: Sequence[Evidence], candidates: Bank, untestable: dict[str, str], baseline: Baseline,
+          centre: FloatArray, tempering: float | None = None, free: Sequence[UnknownFit] = ()) -> Posterior:
     """Posterior of all records together; effects whose whole range would not show are added to `untestable`.
 
     Args:
-        along, candidates: what was flown along every record.
+        evidences, candidates: what was flown.
         untestable: effects left out, with the reason; changed in place.
         baseline: the model and its precision.
         centre: nuisances [n] by which the flown model had been moved.
         tempering: of the evidence; as what is left says if omitted.
+        free: free courses of time, by component.
     """
-    evidences = [course.evidence for course in along]
     data, nothing = total(evidences), np.zeros_like(baseline.precision)
 
     def tempered(by: float) -> FloatArray:
@@ -232,10 +242,8 @@ def weigh(along: Sequence[Course], candidates: Bank, untestable: dict[str, str],
         left = least_misfit(tempered(1.0), candidates, tuple(untestable), nothing)
         tempering = max(temper(left, evidences), 1.0)
     noise = sum(e.samples for e in evidences) / tempering if tempering > 1.0 else np.inf
-    gram, first = tempered(tempering), 1 + len(candidates.nuisances)
-    parts = [[course.model, course.evidence.rows[:, : first - 1]] for course in along]
-    free = course_fits(Courses(along, tempering), parts, gram[:first, :first])
-    posterior = replace(attribute(gram, candidates, tuple(untestable), nothing, noise, free), tempering=tempering)
+    posterior = replace(attribute(tempered(tempering), candidates, tuple(untestable), nothing, noise, free),
+                        tempering=tempering)
     quiet = [name for name, found in posterior.fits.items() if found.smallest is None]
     for name in quiet:
         untestable[name] = "no excitation: these records would not show it anywhere in its range"
