@@ -25,7 +25,7 @@ PLACES = in_time({component for component, _, _ in (*GENERIC, *BEYOND)})
 
 
 def course_fits(courses: Courses, parts: Sequence[Sequence[FloatArray]], gram: FloatArray, held: Collection[int] = (),
-                places: Collection[str] = PLACES) -> list[UnknownFit]:
+                places: Collection[str] = PLACES, keep: bool = False) -> list[UnknownFit]:
     """Evidence of a free course at each of some components over what is left without.
 
     Args:
@@ -33,12 +33,13 @@ def course_fits(courses: Courses, parts: Sequence[Sequence[FloatArray]], gram: F
         gram: inner products of these rows [rows, rows], tempered, priors among them.
         held: rows that give way no more.
         places: components.
+        keep: what their hats make of the records, to be asked for again.
     """
     gone = [j for j in range(1, len(gram)) if j not in held]
     inverse = np.linalg.inv(gram[np.ix_(gone, gone)])
     moved = inverse @ gram[gone, 0]
     misfit, found = float(gram[0, 0] - gram[0, gone] @ moved), []
-    made = each(lambda course, own: _products(course, sorted(places), own), courses.along, parts)
+    made = each(lambda course, own: _products(course, sorted(places), own, keep), courses.along, parts)
     for component in sorted(places):
         inner = block_diag(*(products[component][0] for products in made)) / courses.tempering
         onto = np.concatenate([products[component][1] for products in made]) / courses.tempering
@@ -50,12 +51,14 @@ def course_fits(courses: Courses, parts: Sequence[Sequence[FloatArray]], gram: F
 
 def beside(courses: Courses, left: Remainder, places: Collection[str]) -> list[UnknownFit]:
     """The same of what a set leaves where it was flown."""
-    return course_fits(courses, left.rows, left.gram[: left.first, : left.first], left.held, in_time(places))
+    return course_fits(courses, left.rows, left.gram[: left.first, : left.first], left.held, in_time(places), keep=True)
 
 
-def _products(course: Course, places: Sequence[str], parts: Sequence[FloatArray]
+def _products(course: Course, places: Sequence[str], parts: Sequence[FloatArray], keep: bool
               ) -> dict[str, tuple[FloatArray, FloatArray]]:  # fmt: skip
     """Inner products of a record's hats, at each component, with themselves and with other rows."""
+    if keep:
+        return {place: (course.inner(place, place), course.onto(place, parts)) for place in places}
     found, other = {}, np.concatenate(parts, axis=1)
     for k in range(0, len(places), TOGETHER):
         for component, rows in course.made(places[k : k + TOGETHER]).items():

@@ -23,7 +23,7 @@ from sim2real.reconstruct import Reconstruction
 
 PLACED = 3e-5  # rad, what a fitted law leaves (assumed: a position's noise over the root of the samples behind a term)
 EXACT = 3e-6  # rad, the same of a law of which nothing but the lag is fitted (assumed)
-DRIFTS = 6  # cosines over a record that a law's shift may take
+RATE, DRIFTS = 3, 6  # its column in a basis; cosines over a record that a law's shift may take
 SCALES = (5, 25, 100)  # samples over which what is left has to average out as white noise does
 SHORTEST, FINE = 1e-3, 1e-4  # s: least lag, and how finely it is found
 CHANCE, SURE = 1e-5, 1.05  # of white noise not to pass for it; what the noise itself may be off by (squared)
@@ -75,6 +75,8 @@ def _law(flight: Reconstruction, command: FloatArray, surface: str) -> tuple[Flo
     def square(lag: float, terms: int) -> float:
         return float(np.sum(left(lag, terms) ** 2))
 
+    if _published(left(published, 0), behind(published)[good]):
+        return behind(published, filtered=False)[:, 0], EXACT
     every = behind(published).shape[1]
     laws = [(published, 0, 0), *((_lag(square, terms, published), terms, terms + 1) for terms in (0, 2, every))]
     noise = max(spread(left(laws[-1][0], every)), 1e-9)
@@ -83,6 +85,20 @@ def _law(flight: Reconstruction, command: FloatArray, surface: str) -> tuple[Flo
         return None
     lag, terms, _ = min(white, key=lambda law: square(*law[:2]) / noise**2 + law[2] * np.log(n))
     return np.asarray(behind(lag, filtered=False) @ weights(lag, terms)), PLACED if terms else EXACT
+
+
+def _published(left: FloatArray, basis: FloatArray) -> bool:
+    """Whether nothing need be fitted: what the published actuator leaves is white, and no other law says it better.
+
+    Another lag is to first order an advance.
+    """
+    square, cost = max(spread(left), 1e-9) ** 2, np.log(len(left))
+
+    def gain(columns: FloatArray) -> float:
+        fitted = columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
+        return float(fitted @ fitted) / square
+
+    return _white(left) and gain(basis[:, RATE : RATE + 1]) < cost and gain(basis) < 3.0 * cost
 
 
 def _lag(square: Callable[[float, int], float], terms: int, published: float) -> float:

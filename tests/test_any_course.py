@@ -51,8 +51,9 @@ def test_noise_shows_nothing(course):
 
 
 @pytest.mark.parametrize(("target", "component", "size"), [
-    ("q", "pitching_moment", 0.01), ("r", "yawing_moment", 0.01), ("w", "z_force", 0.3), ("theta", "sensor:theta", 0.01),
-])  # fmt: skip
+    ("q", "pitching_moment", 0.01), ("r", "yawing_moment", 0.01), ("w", "z_force", 0.3),
+    ("theta", "sensor:theta", 0.01),
+])
 def test_what_acts_somewhere_shows_there(course, target, component, size):
     found = {u.component: u for u in fits(course, target, size)}
     best = max(found.values(), key=lambda u: u.log_evidence)
