@@ -80,7 +80,6 @@ def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior:
 
 class _Search:
     """Hypotheses, as they are known so far, and those of them that have been flown."""
-
     def __init__(self, flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior: Posterior) -> None:
         self.flying, self.start, self.linear = flying, start, posterior
         self.found = list(posterior.hypotheses)
