@@ -177,7 +177,7 @@ def test_the_predictor_forgets_its_start():
     flight = reconstruct(flown("", 0.0, 5))
     A, C, _ = linearise(flight)
     for gain in gains(flight, (0.02, 0.5, 2.0)):
-        assert np.max(np.abs(np.linalg.eigvals(A - gain.K[-1] @ C[:FED_BACK]))) < 1.0
+        assert np.max(np.abs(np.linalg.eigvals(A - gain.K[-1] @ C[:, :FED_BACK]))) < 1.0
 
 
 def test_undoing_the_low_pass_gives_the_positions_back():
