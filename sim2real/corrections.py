@@ -10,7 +10,7 @@ import numpy as np
 from icing_env.record import FloatArray
 from sim2real.form import Form, shares
 from sim2real.hypotheses import Hypothesis, Posterior
-from sim2real.points import Point
+from sim2real.points import Point, bounded_step, ranges, rooms
 from sim2real.sets import Modes, SetFit, integrate
 from sim2real.sizes import in_powers
 
@@ -57,33 +57,36 @@ def _moved(form: Form, now: Hypothesis, then: Hypothesis) -> Form:
 def corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior) -> Hypothesis:
     """Evidence and sizes of a set from where it settled: its likelihood is taken as Gaussian there."""
     none = 0.5 * float(posterior.reduced[0, 0])
-    last: FloatArray = np.asarray(np.linalg.solve(point.information, point.slope), np.float64)
-    cost = point.cost - 0.5 * float(point.slope @ last)
     k = len(point.sizes)
+    across, others = point.information[:k, k:], point.information[k:, k:]
+    onto: FloatArray = np.asarray(np.linalg.solve(others, np.column_stack([point.slope[k:], across.T])), np.float64)
+    cost = point.cost - 0.5 * float(point.slope[k:] @ onto[:, 0])
     if k == 0:
         return replace(hypothesis, log_evidence=none - cost, fit=replace(hypothesis.fit, misfit=2.0 * cost))
-    inner, across = point.information[:k, :k], point.information[:k, k:]
-    alone = np.asarray(inner - across @ np.linalg.solve(point.information[k:, k:], across.T), np.float64)
-    fit = _integrated(hypothesis.fit, point.sizes, last[:k], cost, alone)
+    slope, information = point.slope[:k] - across @ onto[:, 0], point.information[:k, :k] - across @ onto[:, 1:]
+    fit = _integrated(hypothesis.fit, point, cost, slope, information)
     log = fit.log_evidence + none
     return replace(hypothesis, log_evidence=log, fit=replace(fit, log_evidence=log))
 
 
-def _integrated(fit: SetFit, sizes: FloatArray, last: FloatArray, cost: float, information: FloatArray) -> SetFit:
+def _integrated(fit: SetFit, point: Point, cost: float, slope: FloatArray, information: FloatArray) -> SetFit:
     """Prior times a Gaussian likelihood of the sizes; log_evidence is the log of its integral.
 
     Args:
-        sizes, last: where the set was flown, and the step (in ranges of the parameters) that is left.
-        cost, information: half the whitened square there, and its second derivative per square of range.
+        point: where the set was flown.
+        cost, slope, information: half the whitened square there, nuisances at their best, and its derivatives by sizes
+            in ranges of their parameters. The best may lie at an end of a range, where the slope is none.
     """
-    families, k = fit.families, len(sizes)
+    families, k = fit.families, len(point.sizes)
     size = 1 + max(max(f.rows) for f in families)
-    base = in_powers(np.zeros((size, size)), families)
-    span = np.array([f.parameter.high - f.parameter.low for f in families])
-    x = np.clip((sizes - last * span - base.neutral) / base.reach, base.low, base.high)
-    H = information * np.outer(base.reach / span, base.reach / span)
+    base, span = in_powers(np.zeros((size, size)), families), ranges(fit)
+    low, high = (room[:k] for room in rooms(fit, point, span))
+    step = bounded_step(information, slope, low, high)
+    x, best = ((sizes - base.neutral) / base.reach for sizes in (point.sizes, point.sizes + step * span))
+    g, H = slope * base.reach / span, information * np.outer(base.reach / span, base.reach / span)
     gram = np.zeros((1 + k, 1 + k))
-    gram[0, 0], gram[0, 1:], gram[1:, 0], gram[1:, 1:] = 2.0 * cost + x @ H @ x, -H @ x, -H @ x, H
-    modes = Modes(np.arange(k)[None], x[None], np.array([cost]), H[None], np.zeros(1))
+    gram[0, 0], gram[0, 1:], gram[1:, 1:] = 2.0 * (cost - g @ x) + x @ H @ x, g - H @ x, H
+    gram[1:, 0] = gram[0, 1:]
+    modes = Modes(np.arange(k)[None], best[None], np.array([cost]), H[None], np.zeros(1))
     found = integrate(replace(base, gram=gram, degree=1), modes, 0)
     return replace(found, log_evidence=found.log_evidence - 0.5 * float(gram[0, 0]))

@@ -125,11 +125,11 @@ class Flying:
         return [Slopes(own, terms) for own, (terms, _) in zip(rows, made, strict=True)]
 
     def _step(self, fit: SetFit, point: Point) -> FloatArray:
-        return bounded_step(point.information, point.slope, *rooms(fit, point, _ranges(fit)))
+        return bounded_step(point.information, point.slope, *rooms(fit, point, ranges(fit)))
 
     def _descended(self, fit: SetFit, best: Point) -> Point:
         """The best that is reached with the slopes by nuisances as they are: two to four rows a flight."""
-        share, span = 1.0, _ranges(fit)
+        share, span = 1.0, ranges(fit)
         k = len(span)
         for _ in range(ROUNDS):
             step = share * self._step(fit, best)
@@ -156,7 +156,7 @@ class Flying:
         for flight, own, left, lent in zip(self.flights, rows, made, slopes, strict=True):
             gram += lent.beside(left) / self.tempering
             gram[: 1 + k, : 1 + k] += path_gram(flight, own[: 1 + k], (), round(SETTLE / flight.dt)) / self.tempering
-        span = _ranges(fit)
+        span = ranges(fit)
         unit = np.concatenate([[1.0], span / steps if k else [], np.full(n, 1.0 / NUISANCE_STEP)])
         gram = gram * unit[:, None] * unit
         prior = self.baseline.precision
@@ -197,7 +197,7 @@ class Flying:
         gram[0, first - n : first] = gram[first - n : first, 0]
         gram[0, 0] += point.nuisances @ precision @ point.nuisances
         gram[1 : 1 + k, 1 : 1 + k] += 1e-2 * np.eye(k)
-        return Remainder(gram, first, kept, left_in, tuple(int(j) for j in 1 + k + point.held))
+        return Remainder(gram, first, kept, left_in, (*ends(fit, point), *(int(j) for j in 1 + k + point.held)))
 
     def beside(self, fit: SetFit, point: Point, home: Collection[str]) -> list[FloatArray]:
         """Inner products of every effect of the library (rows of the bank) about a set where it was flown.
@@ -230,8 +230,15 @@ def _holding(rows: NDArray[np.intp], gram: FloatArray) -> FloatArray:
     return out
 
 
-def _ranges(fit: SetFit) -> FloatArray:
+def ranges(fit: SetFit) -> FloatArray:
+    """Of each parameter [k]."""
     return np.array([f.parameter.high - f.parameter.low for f in fit.families])
+
+
+def ends(fit: SetFit, point: Point) -> list[int]:
+    """Sizes that are at an end of their ranges, by row of what a set leaves."""
+    low, high = rooms(fit, point, ranges(fit))
+    return [1 + m for m in range(len(point.sizes)) if low[m] > -1e-9 or high[m] < 1e-9]
 
 
 def rooms(fit: SetFit, point: Point, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
