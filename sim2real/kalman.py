@@ -20,11 +20,11 @@ from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR, SURFACES
 from sim2real.predictor import TANGENT, Predictor
 from sim2real.reconstruct import Reconstruction
 
-# What disturbs the states beside gusts, per square root of second (assumed). More on the rates would forget steady
-# moments, which nothing else shows; less on the velocities makes the colour of strong gusts look like something, and
-# less on the rates what surfaces and gusts do otherwise than the model has it (docs/benchmark_diagnosis.md).
-WALK = {"u": 0.03, "v": 0.03, "w": 0.03, "p": 3e-4, "q": 3e-4, "r": 3e-4, "altitude": 0.05, "phi": 2e-4,
-        "theta": 2e-4}  # fmt: skip
+# What disturbs the states beside gusts, per square root of second (assumed): little, since what is disturbed is
+# forgotten, steady moments first. Gusts go in straight lines between samples here, and meet the aircraft in one point
+# and its tail: a share of their intensity disturbs too (per m/s of sigma_w; chosen on development cases).
+WALK = {"u": 3e-3, "v": 3e-3, "w": 3e-3, "p": 3e-5, "q": 3e-5, "r": 3e-5, "altitude": 5e-3, "phi": 2e-5, "theta": 2e-5}
+WALK_OF_GUST = {"u": 0.04, "v": 0.04, "w": 0.04, "p": 2e-4, "q": 2e-4, "r": 2e-4, "phi": 1e-4, "theta": 1e-4}
 TRANSIENT = 10.0  # s with gains of their own after the start
 SPAN = 1.0  # s along a record that are flown as if at one condition
 ROUGH = 60  # steps after which a gust no longer shows in third differences
@@ -91,7 +91,7 @@ def gains(flight: Reconstruction, sigmas: tuple[float, ...]) -> list[Gain]:
     for sigma in sigmas:
         Qw, columns = _gusts(flight, sigma)
         rough = roughness(A, C, A[:, columns], C[:, columns], Qw)
-        model = _noisy(flight, A, C, B, Qw, flight.noise[:FED_BACK] ** 2 - rough)
+        model = _noisy(flight, A, C, B, sigma, Qw, flight.noise[:FED_BACK] ** 2 - rough)
         steady, S = _steady(*model)
         out.append(Gain(sigma, steady[None], S, model, round(TRANSIENT / flight.dt)))
     return out
@@ -111,7 +111,7 @@ def follow(flight: Reconstruction, gain: Gain) -> Gain:
     noise = np.diag(gain.model[3] - D @ Qw @ D.T) * rate
     K, S = [], []
     for span, A, C, B in zip(spans, *linearise(flight, spans), strict=True):
-        model = _noisy(flight, A, C[:FED_BACK], B, Qw, noise)
+        model = _noisy(flight, A, C[:FED_BACK], B, gain.sigma, Qw, noise)
         here, covariance, P = _recursion(*model, P, min(each, steps - span.start))
         K.append(np.swapaxes(here, 1, 2))
         S.append(covariance)
@@ -125,15 +125,16 @@ def _gusts(flight: Reconstruction, sigma: float) -> tuple[FloatArray, list[int]]
     return gust_noise(sigma, speed, height, flight.dt), [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
 
 
-def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, Qw: FloatArray,
+def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, sigma: float, Qw: FloatArray,
            noise: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """A, C, and the covariances of the states' noise, the readings' noise and between them.
 
     Args:
+        sigma: gust intensity.
         Qw: covariance of what drives the gusts.
         noise: variance of every fed-back channel's own noise.
     """
-    walk = np.array([WALK.get(name, 1e-6) for name in TANGENT]) ** 2 * flight.dt
+    walk = np.array([np.hypot(WALK.get(n, 1e-6), WALK_OF_GUST.get(n, 0.0) * sigma) for n in TANGENT]) ** 2 * flight.dt
     blank = np.array([not flight.has(name) for name in MEASURED[:FED_BACK]])
     rate = np.array([max(np.mean(np.isfinite(flight.measured[:, j])), 1e-3) for j in range(FED_BACK)])
     least = np.array([NOISE_FLOOR[name] for name in MEASURED[:FED_BACK]])

@@ -22,7 +22,7 @@ from sim2real.kalman import Gain
 from sim2real.reconstruct import Reconstruction
 
 ROUNDS, SETTLED = 10, 4.0  # flown steps, and the whitened length of one that ends them
-AGAIN = 2  # the round after which gust intensities are chosen anew
+AGAIN = 2  # the round after which gust intensities are chosen anew at every step: what does not fit passes for gusts
 LONGEST = 40.0  # standard deviations that a step may move a number
 REFERENCE_SPEED = 65.0  # m/s, where a number has its value; it changes with (65/V)^2, as alpha does in level flight
 CHANGES = 1.0  # prior standard deviation of that change at twice the dynamic pressure, in that of the value (assumed)
@@ -85,7 +85,7 @@ def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank) -> Baselin
     spread = np.concatenate([np.ones(n), np.full(n, CHANGES)])
     for k in range(ROUNDS):
         evidences = _gather(flights, fitted, x, at, gains)
-        gains = None if k == AGAIN else [e.gain for e in evidences]
+        gains = None if k >= AGAIN else [e.gain for e in evidences]
         information, slope, tempering = _normal(evidences, at)
         prior = np.diag(1.0 / np.maximum(spread, np.abs(x)) ** 2)
         precision = information / tempering + prior
