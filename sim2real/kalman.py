@@ -25,7 +25,7 @@ from sim2real.reconstruct import Reconstruction
 # too (per m/s of sigma_w). Both are set where innovations of aircraft that the model knows are white, means over 100
 # samples and over whole records included (`tests/test_whiteness.py`).
 WALK = {"u": 3e-3, "v": 3e-3, "w": 3e-3, "p": 3e-5, "q": 3e-5, "r": 3e-5, "altitude": 5e-3, "phi": 2e-5, "theta": 2e-5}
-WALK_OF_GUST = {"u": 0.01, "v": 0.01, "w": 0.01, "p": 1e-4, "q": 1.3e-4, "r": 1e-4, "phi": 3e-5, "theta": 3e-5}
+WALK_OF_GUST = {"u": 0.01, "v": 0.01, "w": 0.01, "p": 1.5e-4, "q": 1.5e-4, "r": 2e-4, "phi": 5e-5, "theta": 5e-5}
 TRANSIENT = 10.0  # s with gains of their own after the start
 SPAN = 1.0  # s along a record that are flown as if at one condition
 ROUGH = 60  # steps after which a gust no longer shows in third differences
