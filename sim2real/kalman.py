@@ -21,11 +21,10 @@ from sim2real.predictor import TANGENT, Predictor
 from sim2real.reconstruct import Reconstruction
 
 # What disturbs the states beside gusts, per square root of second: little, since what is disturbed is forgotten, steady
-# moments first. Gusts go in straight lines between samples here and not in the air: a share of their intensity disturbs
-# too (per m/s of sigma_w). Both are set where innovations of aircraft that the model knows are white, means over 100
-# samples and over whole records included (`tests/test_whiteness.py`).
-WALK = {"u": 3e-3, "v": 3e-3, "w": 3e-3, "p": 3e-5, "q": 3e-5, "r": 3e-5, "altitude": 5e-3, "phi": 2e-5, "theta": 2e-5}
-WALK_OF_GUST = {"u": 0.01, "v": 0.01, "w": 0.01, "p": 1.5e-4, "q": 1.5e-4, "r": 2e-4, "phi": 5e-5, "theta": 5e-5}
+# moments first; and per m/s of gusts beside `_within_steps`. Both are set where innovations of aircraft that the model
+# knows are white, means over 100 samples and over whole records included (`tests/test_whiteness.py`).
+WALK = {"u": 3e-3, "v": 3e-3, "w": 3e-3, "p": 3e-5, "q": 3e-5, "r": 3e-5, "altitude": 5e-3, "phi": 4e-5, "theta": 4e-5}
+WALK_OF_GUST = {"q": 2.5e-4, "phi": 5e-5, "theta": 5e-5}
 TRANSIENT = 10.0  # s with gains of their own after the start
 SPAN = 1.0  # s along a record that are flown as if at one condition
 ROUGH = 60  # steps after which a gust no longer shows in third differences
@@ -141,9 +140,29 @@ def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, 
     least = np.array([NOISE_FLOOR[name] for name in MEASURED[:FED_BACK]])
     columns = [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
     G, D = A[:, columns], C[:, columns]
-    Q = G @ Qw @ G.T + np.diag(walk) + (B * flight.surface_noise**2) @ B.T
+    Q = G @ Qw @ G.T + np.diag(walk) + (B * flight.surface_noise**2) @ B.T + _within_steps(A, Qw)
     R = np.diag(np.where(blank, 1e6, np.maximum(noise, least**2) / rate))
     return A, C, Q, D @ Qw @ D.T + R, G @ Qw @ D.T
+
+
+def _within_steps(A: FloatArray, Qw: FloatArray) -> FloatArray:
+    """Covariance of the states' noise from how gusts leave the straight lines between samples that the model has.
+
+    White noise drives them: about its line such a gust is a Brownian bridge, whose mean over the step has a twelfth of
+    the variance that the step adds. The tail's delay (a Pade form) passes what is quick with its sign turned, and twice
+    that mean a little later.
+    """
+    u, v, w, tail = (TANGENT.index(n) for n in ("gust_u", "gust_v", "gust_w", "gust_w_tail"))
+    moved = [*(TANGENT.index(n) for n in ("u", "v", "w", "p", "q", "r")), tail]
+    shape = np.zeros((3, 5))
+    shape[0, 0], shape[1, 1:3], shape[2, 3:5] = 1.0, *[[np.sqrt(1.5), (1.0 - np.sqrt(3.0)) / np.sqrt(2.0)]] * 2
+    of_tail = 2.0 * A[moved, tail] / (1.0 + A[tail, tail])  # of a gust there that lasts the step
+    of_wing = 2.0 * A[moved, w] - A[tail, w] * of_tail
+    mean = np.column_stack([2.0 * A[moved, u], 2.0 * A[moved, v], of_wing - of_tail])
+    mean[-1] = 0.0, 0.0, 2.0 * (1.0 - A[tail, tail])
+    out = np.zeros_like(A)
+    out[np.ix_(moved, moved)] = mean * np.diag(shape @ Qw @ shape.T) @ mean.T / 12.0
+    return out
 
 
 def roughness(A: FloatArray, C: FloatArray, G: FloatArray, D: FloatArray, Qw: FloatArray) -> FloatArray:
