@@ -28,7 +28,7 @@ THRUST_SPREAD = 0.3  # of thrust that was not recorded and is balanced against t
 FILTER_SPREAD, VANE_SPREAD = 0.1, 0.005  # of the recording's cut-off, and s: channels are in step to a few ms (assumed)
 VANE_SCALE = 0.015  # of a flow vane's reading, upwash included (assumed)
 LEAST = 0.1  # of a published value: a filter or a thrust with another sign does not fly
-NUISANCE_STEP = 1.0  # standard deviations at which the derivative with respect to a nuisance is taken
+NUISANCE_STEP = 0.1  # standard deviations at which the derivative with respect to a nuisance is taken
 
 
 @dataclass(frozen=True)

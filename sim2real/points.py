@@ -22,7 +22,8 @@ from sim2real.references import Baseline
 from sim2real.sets import SetFit
 from sim2real.side_by_side import each
 
-ROUNDS, TURNS = 6, 3  # steps with the same slopes by nuisances, and how often these are flown anew
+ROUNDS, TURNS = 10, 3  # steps with the same slopes by nuisances, and how often these are flown anew
+PATIENCE = 2  # steps that need not help
 SETTLED = 0.2  # gain of half the whitened square that is worth another round
 NEAR = 5.0  # such a gain, of a point so near that its slopes will do
 FAR = 1000.0  # whitened square above the linear fit's that makes another start worth a flight
@@ -128,15 +129,25 @@ class Flying:
         return bounded_step(point.information, point.slope, *rooms(fit, point, ranges(fit)))
 
     def _descended(self, fit: SetFit, best: Point) -> Point:
-        """The best that is reached with the slopes by nuisances as they are: two to four rows a flight."""
-        share, span = 1.0, ranges(fit)
+        """The best that is reached with the slopes by nuisances as they are: two to four rows a flight.
+
+        A size and the nuisance of the number that it changes make a narrow curved valley: a step along it climbs its
+        side first, and the next leads down again. So a few steps need not help (the watchdog of Chamberlain, Powell,
+        Lemarechal and Pedersen, Mathematical Programming Study 16, 1982).
+        """
+        at, share, waited, span = best, 1.0, 0, ranges(fit)
         k = len(span)
         for _ in range(ROUNDS):
-            step = share * self._step(fit, best)
-            if _promised(best, step) < SETTLED:
+            step = share * self._step(fit, at)
+            if at is best and _promised(at, step) < SETTLED:
                 break
-            tried = self.point(fit, best.sizes + step[:k] * span, best.nuisances + step[k:], best.slopes)
-            best, share = (tried, 1.0) if tried.cost < best.cost else (best, 0.5 * share)
+            at = self.point(fit, at.sizes + step[:k] * span, at.nuisances + step[k:], best.slopes)
+            if at.cost < best.cost:
+                best, share, waited = at, 1.0, 0
+            elif waited < PATIENCE:
+                waited += 1
+            else:
+                at, share, waited = best, 0.5 * share, 0
         return best
 
     def point(self, fit: SetFit, sizes: FloatArray, nuisances: FloatArray, slopes: Sequence[Slopes] = ()) -> Point:

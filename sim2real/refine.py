@@ -199,14 +199,20 @@ class _Search:
         return sorted(chosen, key=lambda i: -self.found[i].log_posterior)
 
     def companions(self) -> list[int]:
-        """Pairs of the best single effect, where it was flown, with what may stand beside it."""
-        if not (alone := self._ranked(1)):
-            return []
-        first, left = self.found[alone[0]], float(self.left[alone[0]].reduced()[0, 0])
-        if not any(left - u.left > TAKEN for u in self.generic[alone[0]]) and not len(self.points[alone[0]].held):
+        """Pairs of the best single effects, where they were flown, with what may stand beside them.
+
+        The best with what may be forgiven it, and the best as it is: of a large gap much may be forgiven.
+        """
+        alone = self._ranked(1)
+        bare = max(alone, key=lambda i: self.found[i].log_evidence, default=-1)
+        return [j for i in dict.fromkeys([*alone[:1], bare] if alone else []) for j in self._companions(i)]
+
+    def _companions(self, i: int) -> list[int]:
+        first, left = self.found[i], float(self.left[i].reduced()[0, 0])
+        if not any(left - u.left > TAKEN for u in self.generic[i]) and not len(self.points[i].held):
             return []
         return [self._propose(together(first.fit, fit))
-                for fit in companions(self.flying, self.linear, first.fit, self.points[alone[0]])]  # fmt: skip
+                for fit in companions(self.flying, self.linear, first.fit, self.points[i])]
 
     def _propose(self, fit: SetFit) -> int:
         """Index of a pair, with sizes as proposed if it was not flown yet."""

@@ -28,6 +28,7 @@ from sim2real.terms import pushes
 
 SETTLING, SETTLED = 4, 3.0  # steps towards the best nuisances, and the whitened length of a step that ends them
 RELINEARISE = 8.0  # whitened distance of the fitted nuisances beyond which all is flown again about them
+MOVES = 3  # times at most
 CALMER = 0.6  # ratio of temperings below which the leading explanations are flown again
 UNLIKE = 0.25  # log of the ratio of innovation variances beyond which another gain is worth a flight: two of SIGMAS
 FIRST_ORDER = 3.0  # least tempering where another simulator's accelerations stand in for its flight (assumed)
@@ -51,7 +52,9 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
     found = _Weighing(flights, candidates, baseline, untestable, centre)
     progress(f"flying {candidates.size} variants along {len(flights)} records")
     found.gather(known)
-    if found.moved():
+    for _ in range(MOVES):
+        if not found.moved():
+            break
         progress("flying the variants again about the fitted model")
         found.gather(found.known)
     progress("looking for what no generic term follows")
