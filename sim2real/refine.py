@@ -199,13 +199,10 @@ class _Search:
         return sorted(chosen, key=lambda i: -self.found[i].log_posterior)
 
     def companions(self) -> list[int]:
-        """Pairs of the best single effects, where they were flown, with what may stand beside them.
-
-        The best with what may be forgiven it, and the best as it is: of a large gap much may be forgiven.
-        """
+        """Pairs of the best single effects, where they were flown: with what may be forgiven them, and as they are."""
         alone = self._ranked(1)
-        bare = max(alone, key=lambda i: self.found[i].log_evidence, default=-1)
-        return [j for i in dict.fromkeys([*alone[:1], bare] if alone else []) for j in self._companions(i)]
+        best = dict.fromkeys([*alone[:1], *sorted(alone, key=lambda i: -self.found[i].log_evidence)[:1]])
+        return [j for i in best for j in self._companions(i)]
 
     def _companions(self, i: int) -> list[int]:
         first, left = self.found[i], float(self.left[i].reduced()[0, 0])
@@ -294,11 +291,8 @@ class _Search:
         told = forgive(kept, self.nothing, least, bare, flown)
         bound = max(told[k].log_posterior for k in flown)
         told = [h for k, h in enumerate(told) if k in flown or h.unknown is not None or h.log_posterior <= bound]
-        return replace(self.linear, hypotheses=normalised(told, 0.0), bare=bare, settled=self._settled(ranked[0]))
-
-    def _settled(self, i: int) -> FloatArray:
-        """Nuisances [n] where a flown set settled, in its other form where that was flown."""
-        return (self.bent[i].point if i in self.bent else self.points[i]).nuisances
+        settled = self.bent[ranked[0]].point if ranked[0] in self.bent else self.points[ranked[0]]
+        return replace(self.linear, hypotheses=normalised(told, 0.0), bare=bare, settled=settled.nuisances)
 
 
 def _moved(terms: Sequence[Term]) -> tuple[Term, ...]:
