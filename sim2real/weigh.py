@@ -52,8 +52,8 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
     found = _Weighing(flights, candidates, baseline, untestable, centre)
     progress(f"flying {candidates.size} variants along {len(flights)} records")
     found.gather(known)
-    for k in range(MOVES):
-        if not found.moved(gains_too=k == 0):
+    for _ in range(MOVES):
+        if not found.moved():
             break
         progress("flying the variants again about the fitted model")
         found.gather(found.known)
@@ -115,13 +115,10 @@ class _Weighing:
         t = self.posterior.tempering
         return Flying(self.flights, self.candidates, self.evidences, self.baseline, t, Courses(self.along, t))
 
-    def moved(self, gains_too: bool) -> bool:
-        """Move the centre to where the likeliest explanation has it, if that is far from what was flown.
+    def moved(self) -> bool:
+        """Move the centre to where the likeliest explanation has it, if that or its gains are far from what was flown.
 
         A known set is fitted where it lies; beside something unknown the linear fit has to do.
-
-        Args:
-            gains_too: move it where only the gains would be others, too.
         """
         best, there, other = self.posterior.best, self.start(self.posterior.best), False
         if leading(self.posterior):
@@ -130,7 +127,7 @@ class _Weighing:
                 best, there = replace(best, fit=replace(best.fit, estimate=tuple(point.sizes))), point.nuisances
             other = self._judged(best, there)
         step = nearer(there, self.candidates) - self.centre
-        if not (other and gains_too) and _length(self._gram(), step) <= RELINEARISE:
+        if not other and _length(self._gram(), step) <= RELINEARISE:
             return False
         self.centre = self.centre + step
         return True
