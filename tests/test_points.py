@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ import pytest
 from icing_env import scenario
 from icing_env.aircraft import load
 from sim2real.candidates import bank
+from sim2real.corrections import corrected
 from sim2real.courses import Course, Courses
 from sim2real.evidence import gather
-from sim2real.points import Flying, bounded_step, rooms
+from sim2real.hypotheses import Hypothesis
+from sim2real.points import Flying, Point, bounded_step, rooms
 from sim2real.reconstruct import reconstruct
 from sim2real.references import Baseline
 from sim2real.sets import SetFit
@@ -67,3 +70,17 @@ def test_it_settles_where_full_steps_of_gauss_and_newton_do(flying):
     settled = flying.settle(NOTHING, start)
     assert best.cost < first - 20.0
     assert settled.cost < best.cost + 0.2
+
+
+@pytest.mark.parametrize(("slope", "misfit"), [(50.0, 200.0), (0.0, 200.0), (-5.0, 197.5)])
+def test_no_set_is_credited_with_what_lies_beyond_its_range(slope, misfit):
+    """A size at the lower end: what falls on towards less is not to be had, what falls on towards more is."""
+    family = next(f for f in bank().families if f.effect.name == "rudder_power")
+    end = (family.parameter.low,)
+    fit = SetFit((family,), 0.0, end, end, end, np.array([[1e-4]]), {}, 0.0)
+    point = Point(np.array(end), np.zeros(0), 100.0, np.array([slope]), np.array([[10.0]]))
+    posterior = SimpleNamespace(reduced=np.array([[300.0]]))
+    found = corrected(Hypothesis(fit, None, 0.0, 0.0), point, posterior)
+    assert found.fit.misfit == pytest.approx(misfit, abs=2.0)  # a step of its grid
+    assert found.log_evidence < 0.5 * (300.0 - misfit)
+    assert found.fit.low95[0] >= end[0]
