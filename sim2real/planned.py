@@ -15,7 +15,7 @@ from icing_env.atmosphere import density
 from icing_env.errors import InputError, nearest
 from icing_env.parameters import UNITS
 from icing_env.record import FlightRecord, FloatArray, RecordMeta
-from sim2real.candidates import Bank, parameter_rows
+from sim2real.candidates import NUISANCE_STEP, Bank, parameter_rows
 from sim2real.channels import FED_BACK, G0, MEASURED, NOISE_FLOOR, SURFACES
 from sim2real.evidence import compare
 from sim2real.kalman import follow as follow_gain
@@ -24,7 +24,7 @@ from sim2real.manoeuvre import MANOEUVRES, Manoeuvre, asked, flown
 from sim2real.paths import driven, follow, full_power
 from sim2real.predictor import TANGENT
 from sim2real.reconstruct import Reconstruction
-from sim2real.surfaces import EXACT
+from sim2real.surfaces import PLACED
 from sim2real.weigh import FARTHEST, Progress
 
 STEP, SLOW = 0.02, ("altitude", "thrust_left", "thrust_right")  # s between samples; channels sampled every fifth
@@ -129,7 +129,7 @@ def _commanded(made: Reconstruction) -> Reconstruction:
         controls[f"power_{side}"] = wanted.copy()
         controls[f"power_{side}"][1:] = lfilter([share], [1.0, share - 1.0], wanted[1:],
                                                 zi=[(1.0 - share) * wanted[0]])[0]  # fmt: skip
-    known = np.full(len(SURFACES), EXACT)
+    known = np.full(len(SURFACES), PLACED)
     return driven(replace(made, controls=controls, positions=positions, commands=commands, surface_noise=known), row,
                   SURFACES)
 
@@ -180,7 +180,9 @@ def _signatures(made: Reconstruction, candidates: Bank, sigma: float, moved: Flo
     for nuisance, sizes in zip(candidates.nuisances, moved.T, strict=True):
         if sizes.any():
             nuisance.apply(rows, slice(None), made.power_from, sizes)
-    return compare(made, rows, gain, _factor(made, gain.S)).gram
+    unit = np.ones(candidates.size)
+    unit[1 : 1 + len(candidates.nuisances)] = 1.0 / NUISANCE_STEP
+    return compare(made, rows, gain, _factor(made, gain.S)).gram * unit[:, None] * unit
 
 
 def _apparent(made: Reconstruction, sigma: float) -> FloatArray:

@@ -32,7 +32,7 @@ FARTHEST = 5.0  # standard deviations of a nuisance: what is beyond is no nuisan
 
 @dataclass(frozen=True)
 class Slopes:
-    """What a step of each nuisance makes of one record [N x channels, n], and of generic terms [N x channels, terms].
+    """What a deviation of each nuisance makes of one record [N x channels, n], and generic terms [N x channels, terms].
 
     Lent from point to point; their inner products are taken once.
     """
@@ -119,7 +119,7 @@ class Flying:
     @cached_property
     def near(self) -> list[Slopes]:
         """Slopes by nuisances where the variants were flown."""
-        return self._slopes([e.rows[:, : len(self.candidates.nuisances)] for e in self.evidences])
+        return self._slopes([e.rows[:, : len(self.candidates.nuisances)] / NUISANCE_STEP for e in self.evidences])
 
     def _slopes(self, rows: Sequence[FloatArray]) -> list[Slopes]:
         made = self.courses.of_terms(self.candidates.terms)
@@ -162,13 +162,13 @@ class Flying:
         rows = [_rows(f, self.candidates, fit, sizes, steps, nuisances)[:count] for f in self.flights]
         made = each(lambda flight, own, e: flown(flight, own, (), e.gain, e.factor, keep=range(count)).rows,
                     self.flights, rows, self.evidences)
-        slopes = slopes or self._slopes([own[:, 1 + k :] for own in made])
+        slopes = slopes or self._slopes([own[:, 1 + k :] / NUISANCE_STEP for own in made])
         made = [own[:, : 1 + k] for own in made]
         for flight, own, left, lent in zip(self.flights, rows, made, slopes, strict=True):
             gram += lent.beside(left) / self.tempering
             gram[: 1 + k, : 1 + k] += path_gram(flight, own[: 1 + k], (), round(SETTLE / flight.dt)) / self.tempering
         span = ranges(fit)
-        unit = np.concatenate([[1.0], span / steps if k else [], np.full(n, 1.0 / NUISANCE_STEP)])
+        unit = np.concatenate([[1.0], span / steps if k else [], np.ones(n)])
         gram = gram * unit[:, None] * unit
         prior = self.baseline.precision
         slope, information = gram[1:, 0].copy(), gram[1:, 1:].copy()
