@@ -99,7 +99,7 @@ class Flying:
     courses: Courses
 
     def settle(self, fit: SetFit, start: FloatArray) -> Point:
-        """Gauss-Newton on sizes and nuisances, from nuisances `start` [n]; a step that does not help is halved.
+        """Gauss-Newton on sizes and nuisances, from nuisances `start` [n]; when steps do not help, half as far.
 
         Where that is far worse than the linear fit had it, from the published model if that is nearer.
         """
