@@ -84,7 +84,7 @@ def flown_squares(fit: SetFit, flown: Bent) -> tuple[list[float], list[float]]:
     """`form.squares` of a set by its slopes where it was flown: nuisances integrated out, and where they are."""
     k, gram = len(fit.families), flown.left.gram
     away = flown.point.sizes - np.array([f.parameter.neutral for f in fit.families])
-    times = (away / size_steps(fit, flown.point.sizes)) ** 2
+    times = (away / flown.point.steps) ** 2
     gone = [j for j in range(1 + k, flown.left.first) if j not in flown.left.held]
     across = gram[np.ix_(gone, range(1, 1 + k))]
     taken = np.sum(across * np.linalg.solve(gram[np.ix_(gone, gone)], across), axis=0)
@@ -106,13 +106,14 @@ def bring(flying: Flying, fit: SetFit, bent: Bent, rows: Sequence[int], variance
         weights = np.array([bent.point.weights.get(name, 0.0) for name in names])
         slope = bent.left.gram[at, 0] + np.r_[np.zeros(first - 1), weights / variance]
         inner = bent.left.gram[np.ix_(at, at)] + np.diag(np.r_[np.zeros(first - 1), 1.0 / variance])
-        unit, free = size_steps(fit, bent.point.sizes), np.full(len(names), np.inf)
+        unit, free = bent.point.steps, np.full(len(names), np.inf)
         low, high = rooms(fit, bent.point, unit)
         step = share * bounded_step(inner, slope, np.r_[low, -free], np.r_[high, free])
         if -float(step @ slope) - 0.5 * float(step @ inner @ step) < SETTLED:
             break
         k = len(unit)
-        point = replace(bent.point, sizes=bent.point.sizes + step[:k] * unit,
+        sizes = bent.point.sizes + step[:k] * unit
+        point = replace(bent.point, sizes=sizes, steps=size_steps(fit, sizes),
                         nuisances=bent.point.nuisances + step[k : first - 1],
                         weights=dict(zip(names, weights + step[first - 1 :], strict=True)))  # fmt: skip
         tried = Bent(point, flying.left_over(fit, point))

@@ -61,9 +61,9 @@ class Point:
     """A set at given sizes [k] and nuisances [n], flown.
 
     cost: half the whitened square it leaves, the nuisances' prior included, tempered; slope and information: of sizes
-    (in ranges of their parameters), then nuisances; weights: of the generic terms flown with it, by row of the bank;
-    rows: what it leaves of every record, then what a step of each size makes of that, but for the paths
-    [N x channels, 1 + k]; slopes: the same of each nuisance.
+    (in ranges of their parameters), then nuisances; steps: of each size for its slope [k]; weights: of the generic terms
+    flown with it, by row of the bank; rows: what it leaves of every record, then what these steps make of that, but for
+    the paths [N x channels, 1 + k]; slopes: the same of a deviation of each nuisance.
     """
 
     sizes: FloatArray
@@ -71,6 +71,7 @@ class Point:
     cost: float
     slope: FloatArray
     information: FloatArray
+    steps: FloatArray
     weights: Mapping[int, float] = field(default_factory=dict)
     rows: Sequence[FloatArray] = ()
     slopes: Sequence[Slopes] = ()
@@ -176,7 +177,7 @@ class Flying:
         information[k:, k:] += prior
         information[:k, :k] += np.eye(k)  # a size moves no farther than its range
         cost = 0.5 * (gram[0, 0] + nuisances @ prior @ nuisances)
-        return Point(sizes, nuisances, float(cost), slope, information, rows=made, slopes=slopes)
+        return Point(sizes, nuisances, float(cost), slope, information, steps, rows=made, slopes=slopes)
 
     def left_over(self, fit: SetFit, point: Point) -> Remainder:
         """What a set leaves where it was flown, everything in it free to give way.
@@ -185,13 +186,13 @@ class Flying:
         rows are flown again, but for the slopes by nuisances.
         """
         terms, k, n = self.candidates.terms, len(point.sizes), len(point.nuisances)
-        first, steps = 1 + k + n, size_steps(fit, point.sizes)
+        first = 1 + k + n
         moved = tuple(replace(term, row=first + j) for j, term in enumerate(terms))
         gram, kept, left_in = np.zeros((first + len(terms),) * 2), [], dict.fromkeys(PATHS, 0.0)
         pushed = self.courses.pushed(terms, point.weights, 1 + k)
         for i, (flight, evidence, (generic, inner), pushes) in enumerate(zip(
                 self.flights, self.evidences, self.courses.of_terms(terms), pushed, strict=True)):
-            rows = _rows(flight, self.candidates, fit, point.sizes, steps, point.nuisances)[: 1 + k]
+            rows = _rows(flight, self.candidates, fit, point.sizes, point.steps, point.nuisances)[: 1 + k]
             for component, over in excess(flight, rows[:1]).items():
                 left_in[component] += over / self.tempering
             own, slopes = point.rows[i], point.slopes[i]
@@ -215,9 +216,7 @@ class Flying:
 
         Then the same without what free courses of time at `home`, or a path there, would explain.
         """
-        only = replace(self.candidates, terms=())
-
-        names = in_time(home)
+        only, names = replace(self.candidates, terms=()), in_time(home)
 
         def of_record(flight: Reconstruction, evidence: Evidence, course: Course) -> tuple[FloatArray, FloatArray]:
             at = _rows(flight, self.candidates, fit, point.sizes, np.zeros(len(point.sizes)), point.nuisances)[:1]

@@ -78,7 +78,7 @@ def test_no_set_is_credited_with_what_lies_beyond_its_range(slope, misfit):
     family = next(f for f in bank().families if f.effect.name == "rudder_power")
     end = (family.parameter.low,)
     fit = SetFit((family,), 0.0, end, end, end, np.array([[1e-4]]), {}, 0.0)
-    point = Point(np.array(end), np.zeros(0), 100.0, np.array([slope]), np.array([[10.0]]))
+    point = Point(np.array(end), np.zeros(0), 100.0, np.array([slope]), np.array([[10.0]]), np.ones(1))
     posterior = SimpleNamespace(reduced=np.array([[300.0]]))
     found = corrected(Hypothesis(fit, None, 0.0, 0.0), point, posterior)
     assert found.fit.misfit == pytest.approx(misfit, abs=2.0)  # a step of its grid
