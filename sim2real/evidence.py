@@ -25,7 +25,9 @@ from sim2real.reconstruct import Reconstruction
 from sim2real.response import Filter, Responses
 from sim2real.terms import Term, pushes
 
-SIGMAS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.55, 0.67, 0.82, 1.0, 1.2, 1.45, 1.75, 2.1, 2.6, 3.2)  # m/s
+# m/s
+SIGMAS = (0.003, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.55, 0.67, 0.82, 1.0, 1.2, 1.45, 1.75, 2.1, 2.6,
+          3.2)  # fmt: skip
 SETTLE = 4.0  # s, until the predictor has forgotten how it was started
 CHUNK = 500  # samples whitened at a time
 NONE = Responses()

@@ -18,7 +18,7 @@ from sim2real.sets import SetFit
 from sim2real.singles import EffectFit
 
 # Prior (assumed): what is left is shared by single effects. A pair is about one per cent as likely as either member.
-P_NONE, P_UNKNOWN, P_PAIRS, P_TRIPLES, P_BESIDE = 0.5, 0.05, 0.07, 0.002, 0.007
+P_NONE, P_UNKNOWN, P_PAIRS, P_TRIPLES, P_BESIDE = 0.7, 0.03, 0.042, 0.0012, 0.0042
 SAME_PLACE = 0.02  # of that where two members are faults of one device: another form of one is likelier (assumed)
 DOUBT = 0.02  # of the probability: that the evidence as a whole misleads (assumed; chosen on development cases)
 KEPT = 1e-5  # sets of several effects less probable than this are dropped

@@ -20,11 +20,12 @@ from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR, SURFACES
 from sim2real.predictor import TANGENT, Predictor
 from sim2real.reconstruct import Reconstruction
 
-# What disturbs the states beside gusts, per square root of second (assumed). More on the rates would forget steady
-# moments, which nothing else shows; less on the velocities makes the colour of strong gusts look like something, and
-# less on the rates what surfaces and gusts do otherwise than the model has it (docs/benchmark_diagnosis.md).
-WALK = {"u": 0.03, "v": 0.03, "w": 0.03, "p": 3e-4, "q": 3e-4, "r": 3e-4, "altitude": 0.05, "phi": 2e-4,
-        "theta": 2e-4}  # fmt: skip
+# What disturbs the states beside gusts, per square root of second: little, since what is disturbed is forgotten, steady
+# moments first; and per m/s of gusts beside `_within_steps`. Both are set where innovations of aircraft that the model
+# knows are white, means over 100 samples and over whole records included (`tests/test_whiteness.py`).
+WALK = {"u": 3e-3, "v": 3e-3, "w": 3e-3, "p": 3e-5, "q": 3e-5, "r": 3e-5, "altitude": 5e-3, "phi": 4e-5, "theta": 4e-5}
+WALK_OF_GUST = {"q": 2.5e-4, "phi": 5e-5, "theta": 5e-5}
+SECOND_HAND = 10.0  # times as much where accelerations of another simulator are taken at noisy states (assumed)
 TRANSIENT = 10.0  # s with gains of their own after the start
 SPAN = 1.0  # s along a record that are flown as if at one condition
 ROUGH = 60  # steps after which a gust no longer shows in third differences
@@ -91,7 +92,7 @@ def gains(flight: Reconstruction, sigmas: tuple[float, ...]) -> list[Gain]:
     for sigma in sigmas:
         Qw, columns = _gusts(flight, sigma)
         rough = roughness(A, C, A[:, columns], C[:, columns], Qw)
-        model = _noisy(flight, A, C, B, Qw, flight.noise[:FED_BACK] ** 2 - rough)
+        model = _noisy(flight, A, C, B, sigma, Qw, flight.noise[:FED_BACK] ** 2 - rough)
         steady, S = _steady(*model)
         out.append(Gain(sigma, steady[None], S, model, round(TRANSIENT / flight.dt)))
     return out
@@ -111,7 +112,7 @@ def follow(flight: Reconstruction, gain: Gain) -> Gain:
     noise = np.diag(gain.model[3] - D @ Qw @ D.T) * rate
     K, S = [], []
     for span, A, C, B in zip(spans, *linearise(flight, spans), strict=True):
-        model = _noisy(flight, A, C[:FED_BACK], B, Qw, noise)
+        model = _noisy(flight, A, C[:FED_BACK], B, gain.sigma, Qw, noise)
         here, covariance, P = _recursion(*model, P, min(each, steps - span.start))
         K.append(np.swapaxes(here, 1, 2))
         S.append(covariance)
@@ -125,23 +126,45 @@ def _gusts(flight: Reconstruction, sigma: float) -> tuple[FloatArray, list[int]]
     return gust_noise(sigma, speed, height, flight.dt), [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
 
 
-def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, Qw: FloatArray,
+def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, sigma: float, Qw: FloatArray,
            noise: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """A, C, and the covariances of the states' noise, the readings' noise and between them.
 
     Args:
+        sigma: gust intensity.
         Qw: covariance of what drives the gusts.
         noise: variance of every fed-back channel's own noise.
     """
-    walk = np.array([WALK.get(name, 1e-6) for name in TANGENT]) ** 2 * flight.dt
+    looser = 1.0 if flight.known is None else SECOND_HAND
+    walk = np.array([np.hypot(looser * WALK.get(n, 1e-6), WALK_OF_GUST.get(n, 0.0) * sigma) for n in TANGENT])
     blank = np.array([not flight.has(name) for name in MEASURED[:FED_BACK]])
     rate = np.array([max(np.mean(np.isfinite(flight.measured[:, j])), 1e-3) for j in range(FED_BACK)])
     least = np.array([NOISE_FLOOR[name] for name in MEASURED[:FED_BACK]])
     columns = [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
     G, D = A[:, columns], C[:, columns]
-    Q = G @ Qw @ G.T + np.diag(walk) + (B * flight.surface_noise**2) @ B.T
+    Q = G @ Qw @ G.T + np.diag(walk**2 * flight.dt) + (B * flight.surface_noise**2) @ B.T + _within_steps(A, Qw)
     R = np.diag(np.where(blank, 1e6, np.maximum(noise, least**2) / rate))
     return A, C, Q, D @ Qw @ D.T + R, G @ Qw @ D.T
+
+
+def _within_steps(A: FloatArray, Qw: FloatArray) -> FloatArray:
+    """Covariance of the states' noise from how gusts leave the straight lines between samples that the model has.
+
+    White noise drives them: about its line such a gust is a Brownian bridge, whose mean over the step has a twelfth of
+    the variance that the step adds. The tail's delay (a Pade form) passes what is quick with its sign turned, and twice
+    that mean a little later.
+    """
+    u, v, w, tail = (TANGENT.index(n) for n in ("gust_u", "gust_v", "gust_w", "gust_w_tail"))
+    moved = [*(TANGENT.index(n) for n in ("u", "v", "w", "p", "q", "r")), tail]
+    shape = np.zeros((3, 5))
+    shape[0, 0], shape[1, 1:3], shape[2, 3:5] = 1.0, *[[np.sqrt(1.5), (1.0 - np.sqrt(3.0)) / np.sqrt(2.0)]] * 2
+    of_tail = 2.0 * A[moved, tail] / (1.0 + A[tail, tail])  # of a gust there that lasts the step
+    of_wing = 2.0 * A[moved, w] - A[tail, w] * of_tail
+    mean = np.column_stack([2.0 * A[moved, u], 2.0 * A[moved, v], of_wing - of_tail])
+    mean[-1] = 0.0, 0.0, 2.0 * (1.0 - A[tail, tail])
+    out = np.zeros_like(A)
+    out[np.ix_(moved, moved)] = mean * np.diag(shape @ Qw @ shape.T) @ mean.T / 12.0
+    return out
 
 
 def roughness(A: FloatArray, C: FloatArray, G: FloatArray, D: FloatArray, Qw: FloatArray) -> FloatArray:

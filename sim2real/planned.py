@@ -24,7 +24,7 @@ from sim2real.manoeuvre import MANOEUVRES, Manoeuvre, asked, flown
 from sim2real.paths import driven, follow, full_power
 from sim2real.predictor import TANGENT
 from sim2real.reconstruct import Reconstruction
-from sim2real.surfaces import PLACED
+from sim2real.surfaces import EXACT
 from sim2real.weigh import FARTHEST, Progress
 
 STEP, SLOW = 0.02, ("altitude", "thrust_left", "thrust_right")  # s between samples; channels sampled every fifth
@@ -129,7 +129,7 @@ def _commanded(made: Reconstruction) -> Reconstruction:
         controls[f"power_{side}"] = wanted.copy()
         controls[f"power_{side}"][1:] = lfilter([share], [1.0, share - 1.0], wanted[1:],
                                                 zi=[(1.0 - share) * wanted[0]])[0]  # fmt: skip
-    known = np.full(len(SURFACES), PLACED)
+    known = np.full(len(SURFACES), EXACT)
     return driven(replace(made, controls=controls, positions=positions, commands=commands, surface_noise=known), row,
                   SURFACES)
 

@@ -16,13 +16,14 @@ import numpy as np
 
 from icing_env.record import FlightRecord
 from sim2real.candidates import Bank, bank, not_testable, unbroken
-from sim2real.evidence import SIGMAS, gather
+from sim2real.evidence import gather
 from sim2real.kalman import gains
 from sim2real.reconstruct import reconstruct
 from sim2real.singles import EffectFit, fit_family
 from testbed.rivals.opinion import Opinion, Scale, Size
 
 SCALE = Scale(level=10100.0, width=1.01, sharpness=5.67e-4, doubt=0.299)  # testbed.rivals.scales, 90 development cases
+CALM = 0.02  # m/s of gusts, as good as none
 SIZES = 2  # flown of each effect, beside none; in between by a parabola
 
 
@@ -33,7 +34,7 @@ def consider(records: Sequence[FlightRecord]) -> Opinion:
         InputError: a record that cannot be used.
     """
     flights, candidates = [reconstruct(record) for record in records], effects_alone()
-    evidences = [gather(flight, candidates, gains(flight, SIGMAS[:1])[0]) for flight in flights]
+    evidences = [gather(flight, candidates, gains(flight, (CALM,))[0]) for flight in flights]
     gram, samples = np.sum([e.gram for e in evidences], axis=0), sum(e.samples for e in evidences)
     untestable = not_testable(flights, candidates)
     best: dict[str, EffectFit] = {}

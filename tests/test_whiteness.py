@@ -1,0 +1,66 @@
+"""Innovations of an aircraft that the model knows are white: the filter expects the noise that is there.
+
+Flown by the generator's plant, whose gusts are drawn every 5 ms: between samples they are not the straight lines that
+the predictor has.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from icing_env.aircraft import load
+from icing_env.record import read
+from sim2real.channels import MEASURED
+from sim2real.diagnosis import _reconstructed
+from sim2real.evidence import SETTLE, whiten, whitening
+from sim2real.kalman import _within_steps, follow, gains, gust_noise, linearise
+from sim2real.predictor import TANGENT, innovations
+from sim2real.reconstruct import Reconstruction
+from sim2real.references import Baseline
+from testbed.withheld import instruments
+from testbed.withheld import plant as pl
+from testbed.withheld.files import record_text, side_text
+from testbed.withheld.flights import Aircraft, fly, turbulence
+from testbed.withheld.manoeuvres import PLANS
+
+SEEDS, LEVEL, BLOCK = 6, 0.5, 100
+FELT = MEASURED[:11]
+
+
+def flown(folder, sigma: float, seed: int) -> Reconstruction:
+    """The published aircraft, with good instruments."""
+    manoeuvre, rng = PLANS[seed % len(PLANS)][seed % 3], np.random.default_rng(seed)
+    flight = fly(Aircraft(), manoeuvre, 1.0, turbulence(manoeuvre, sigma, 1.0, rng))
+    (folder / "1.csv").write_text(record_text(instruments.read(flight.channels, LEVEL, rng), flight.commands))
+    (folder / "1.toml").write_text(side_text("x", "diagnose"))
+    return _reconstructed([read(folder / "1.csv")], Baseline(load(), np.eye(1)), None)[0]
+
+
+@pytest.mark.parametrize("sigma", [0.02, 0.5, 1.5])
+def test_innovations_of_a_known_aircraft_are_white(tmp_path, sigma):
+    white = []
+    for seed in range(SEEDS):
+        flight = flown(tmp_path, sigma if sigma > 0.02 else 0.0, seed)
+        gain = follow(flight, gains(flight, (sigma,))[0])
+        left = innovations(flight, flight.parameters, gain.K)
+        v = whiten(left, whitening(left[:, 0], gain, flight))[round(SETTLE / flight.dt) :, 0, : len(FELT)]
+        white.append(v[: len(v) // BLOCK * BLOCK].reshape(-1, BLOCK, len(FELT)))
+    blocks = np.concatenate([w.mean(axis=1) for w in white])
+    square = dict(zip(FELT, BLOCK * np.mean(blocks**2, axis=0), strict=True))  # one, were it white; to 0.14
+    assert all(0.4 < s < 1.6 for s in square.values()), square
+
+
+def test_gusts_between_samples_disturb_as_much_as_flights_show(tmp_path):
+    manoeuvre, rng = PLANS[0][0], np.random.default_rng(1)
+    gust = turbulence(manoeuvre, 1.0, 1.0, rng)
+    at = np.arange(len(gust))
+    straight = np.column_stack([np.interp(at, at[:: pl.SUB], column[:: pl.SUB]) for column in gust.T])
+    one, other = (fly(Aircraft(), manoeuvre, 1.0, g).states for g in (gust, straight))
+    flight = flown(tmp_path, 0.0, 0)
+    A = linearise(flight)[0][0]
+    expected = _within_steps(A, gust_noise(1.0, manoeuvre.speed, float(np.median(flight.altitude)), flight.dt))
+    for name, column in (("p", pl.P), ("q", pl.Q), ("r", pl.R)):
+        apart = float(np.std(np.diff(one[:, column] - other[:, column])))
+        j = TANGENT.index(name)
+        assert apart == pytest.approx(np.sqrt(expected[j, j]), rel=0.3), name
