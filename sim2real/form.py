@@ -154,15 +154,20 @@ def squares(fit: SetFit, inner: FloatArray) -> list[float]:
 
 
 def energies(own: Sequence[float], explained: float) -> list[float]:
-    """The same, no more than a set explains; of one alone all of that."""
-    return [explained] if len(own) == 1 else [min(square, explained) for square in own]
+    """The same, together no more than a set explains; of one alone all of that.
+
+    Two effects that cancel each other explain the less, however large each of them is.
+    """
+    if len(own) == 1:
+        return [explained]
+    return [square * min(explained / max(sum(own), 1e-12), 1.0) for square in own]
 
 
 def room(fit: SetFit, own: Sequence[float], bending: Sequence[float], terms: Sequence[Term], kept: FloatArray,
          nothing: float) -> FloatArray:
     """Whitened square that each term may take where rho is one [terms].
 
-    Every member shares the square of its own signature (no more than the set explains) among the terms where it enters.
+    Every member shares the square of its own signature (`energies`) among the terms where it enters.
     A power of the regressor of a derivative that it changes may be as large as the whole change of that derivative,
     however much of this lies within the model's own uncertainty, if not all of it does.
 
@@ -172,10 +177,10 @@ def room(fit: SetFit, own: Sequence[float], bending: Sequence[float], terms: Seq
         kept: share of each term's own square that nuisances leave [terms].
         nothing: whitened square that no explanation leaves.
     """
-    explained = max(nothing - fit.misfit, 0.0)
+    most = energies(own, max(nothing - fit.misfit, 0.0))
     out = np.zeros(len(terms))
-    for family, square, whole in zip(fit.families, own, bending, strict=True):
-        energy = min(square, explained)
+    for family, square, energy, whole in zip(fit.families, own, most, bending, strict=True):
+        energy = min(square, energy)
         home = np.array([term.component in _places(family.effect.name) for term in terms])
         if energy > LEAST**2 and home.any():
             out += home * energy / np.count_nonzero(home)

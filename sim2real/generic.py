@@ -7,9 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy.special import gammaln
 
+from icing_env.jit import entry
 from icing_env.record import FloatArray
 from sim2real.candidates import Bank
 from sim2real.sets import SetFit
@@ -17,6 +20,7 @@ from sim2real.terms import Term
 
 SCALES = (0.5, 1.0, 2.0)  # sizes of generic terms, in their own unit (assumed)
 IN_STEP = 0.03  # of the unit of a channel's lag: 3 ms, by which channels are out of step for no reason (assumed)
+FEW = 6  # terms at most that are chosen from a component's one by one
 STEP = 1e-3  # of an effect's range, for the slope of its signature
 
 
@@ -75,8 +79,9 @@ def _each_alone(T: FloatArray, t: FloatArray, scale: float) -> FloatArray:
 def fit_unknown(reduced: FloatArray, bank: Bank) -> list[UnknownFit]:
     """Evidence of generic terms, component by component; log_evidence is over row 0's own likelihood.
 
-    One term alone is as likely beforehand as all of a component's together: most gaps are simple, and every term that
-    is not needed costs evidence.
+    One term alone, a few, and all of a component's together are equally likely beforehand: most gaps are simple, and
+    every term that is not needed costs evidence. A few are chosen one by one, each where it adds most; the evidence of
+    all other choices of as many is not counted.
     """
     out = []
     for component in dict.fromkeys(term.component for term in bank.terms):
@@ -85,28 +90,76 @@ def fit_unknown(reduced: FloatArray, bank: Bank) -> list[UnknownFit]:
         T, t = reduced[np.ix_(rows, rows)], -reduced[rows, 0]
         if np.max(np.diag(T)) <= 0.0:
             continue
-        joint = [_joint(T, t, scale) for scale in SCALES]
-        alone = np.array([_each_alone(T, t, scale) for scale in SCALES])
-        together = float(np.logaddexp.reduce([log for log, _, _ in joint])) - np.log(2 * len(SCALES))
-        single = float(np.logaddexp.reduce(alone, axis=None)) - np.log(2 * alone.size)
-        if single > together:
-            k, chosen = divmod(int(np.argmax(alone)), len(rows))
-            variance = 1.0 / (SCALES[k] ** -2 + T[chosen, chosen])
-            mean, error, kept = np.array([variance * t[chosen]]), np.array([np.sqrt(variance)]), [chosen]
-        else:
-            _, mean, error = max(joint, key=lambda one: one[0])
-            kept = list(range(len(rows)))
+        ways = [way(T, t) for way in (_one, _few, _all)]
+        _, scale, kept = max(ways, key=lambda way: way[0])
+        variance = np.linalg.inv(T[np.ix_(kept, kept)] + scale**-2 * np.eye(len(kept)))
+        mean, error = variance @ t[kept], np.sqrt(np.diag(variance))
         found = tuple((terms[i].name, float(m), float(e)) for i, m, e in zip(kept, mean, error, strict=True))
-        log = float(np.logaddexp(together, single)) - _by_timing(terms, T, t)
-        out.append(UnknownFit(component, log, found,
+        together = float(np.logaddexp.reduce([log for log, _, _ in ways])) - np.log(len(ways))
+        out.append(UnknownFit(component, together - _by_timing(terms, T, t), found,
                               float(reduced[0, 0] - mean @ t[kept]),
                               {rows[i]: float(m) for i, m in zip(kept, mean, strict=True)}))
     return out
 
 
-def _joint(T: FloatArray, t: FloatArray, scale: float) -> tuple[float, FloatArray, FloatArray]:
-    """All terms of a component together: log evidence, means and standard errors."""
+Way = tuple[float, float, list[int]]  # log evidence, the likeliest scale, and terms of a way to describe a component
+
+
+def _one(T: FloatArray, t: FloatArray) -> Way:
+    """One term, whichever."""
+    alone = np.array([_each_alone(T, t, scale) for scale in SCALES])
+    k, chosen = divmod(int(np.argmax(alone)), len(t))
+    return float(np.logaddexp.reduce(alone, axis=None)) - float(np.log(alone.size)), SCALES[k], [chosen]
+
+
+def _few(T: FloatArray, t: FloatArray) -> Way:
+    """Two to FEW terms, each number and each choice of as many as likely."""
+    n, most = len(t), min(FEW, len(t))
+    if most < 2:
+        return -np.inf, SCALES[0], [0]
+    logs, order = np.empty((len(SCALES), most)), np.empty((len(SCALES), most), np.intp)
+    _forward(np.ascontiguousarray(T), t, np.array(SCALES), logs, order)
+    count = np.arange(1, most + 1)
+    choices = gammaln(n + 1) - gammaln(count + 1) - gammaln(n - count + 1)
+    several = (logs - choices)[:, 1:]
+    k, last = np.unravel_index(int(np.argmax(several)), several.shape)
+    return (float(np.logaddexp.reduce(several, axis=None)) - float(np.log(several.size)), SCALES[k],
+            [int(i) for i in order[k, : last + 2]])
+
+
+def _all(T: FloatArray, t: FloatArray) -> Way:
+    """All terms of a component together."""
+    logs = [_joint(T, t, scale) for scale in SCALES]
+    return (float(np.logaddexp.reduce(logs)) - float(np.log(len(SCALES))), SCALES[int(np.argmax(logs))],
+            list(range(len(t))))
+
+
+def _joint(T: FloatArray, t: FloatArray, scale: float) -> float:
+    """Log evidence of some terms together."""
     inner = np.eye(len(t)) + scale**2 * T
     solved = np.linalg.solve(inner, scale * t)
-    log = 0.5 * float(scale * t @ solved) - 0.5 * float(np.linalg.slogdet(inner)[1])
-    return log, np.asarray(scale * solved, np.float64), scale * np.sqrt(np.diag(np.linalg.inv(inner)))
+    return 0.5 * float(scale * t @ solved) - 0.5 * float(np.linalg.slogdet(inner)[1])
+
+
+@entry
+def _forward(T: Any, t: Any, scales: Any, logs: Any, order: Any) -> None:
+    """Choose terms one by one, each where the evidence gains most: its log [scales, chosen] and which [the same]."""
+    n = len(t)
+    for s in range(len(scales)):
+        inner, onto, total = scales[s]**2*T + np.eye(n), scales[s]*t, 0.0
+        left = np.ones(n)
+        for k in range(logs.shape[1]):
+            best, most = -1, -np.inf
+            for j in range(n):
+                gain = 0.5*onto[j]**2/inner[j, j] - 0.5*np.log(inner[j, j])
+                if left[j] > 0.0 and gain > most:
+                    best, most = j, gain
+            total += most
+            logs[s, k], order[s, k], left[best] = total, best, 0.0
+            across, pivot = inner[:, best].copy(), inner[best, best]
+            onto = onto - across*(onto[best]/pivot)
+            for i in range(n):
+                for j in range(n):
+                    inner[i, j] -= across[i]*across[j]/pivot
+            for i in range(n):
+                inner[i, i] = max(inner[i, i], 1e-12)

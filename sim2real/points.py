@@ -61,7 +61,7 @@ class Point:
     """A set at given sizes [k] and nuisances [n], flown.
 
     cost: half the whitened square it leaves, the nuisances' prior included, tempered; slope and information: of sizes
-    (in ranges of their parameters), then nuisances; steps: of each size for its slope [k]; weights: of the generic terms
+    (in ranges of their parameters), then nuisances; steps: of each size for its slope [k]; weights: of generic terms
     flown with it, by row of the bank; rows: what it leaves of every record, then what these steps make of that, but for
     the paths [N x channels, 1 + k]; slopes: the same of a deviation of each nuisance.
     """
