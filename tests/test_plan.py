@@ -72,7 +72,7 @@ def assert_no_harder(more, less):
     for name, limit in less.detection_limits.items():
         other = more.detection_limits[name]
         if other["parameter"] == limit["parameter"]:
-            assert abs(other["smallest"]) <= 1.05 * abs(limit["smallest"]), name
+            assert abs(other["smallest"]) <= 1.08 * abs(limit["smallest"]), name
 
 
 def assert_easier(more, less, *names):
@@ -127,7 +127,7 @@ def test_limits_agree_with_those_after_the_flight(elevator):
                  "wing_ice", "ice_drag", "mass_error", "cg_shift", "elevator_lag", "elevator_gearing", "alpha_bias",
                  "airspeed_scale", "thrust_loss", "pitch_gyro_bias"):  # fmt: skip
         # limits after a flight are linear in the nuisances: those of moments come out too small (docs/diagnosis.md)
-        assert 0.7 < ratio[name] < (1.7 if name in ("static_stability", "elevator_power") else 1.4), (name, ratio[name])
+        assert 0.7 < ratio[name] < (1.9 if name in ("static_stability", "elevator_power") else 1.4), (name, ratio[name])
     near = [n for n, r in ratio.items() if 0.7 < r < 1.3]  # gusts excite some others, diagnose interpolates two
     assert len(near) >= 0.8 * len(ratio) > 25
 

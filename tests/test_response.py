@@ -41,7 +41,7 @@ def test_every_generic_term_does_what_its_flight_does(evidence):
     apart = np.linalg.norm(linear - there, axis=0) / np.maximum(np.linalg.norm(there, axis=0), 1e-6)
     assert len(apart) == len(terms) and np.median(apart) < 0.01 and np.quantile(apart, 0.9) < 0.03
     # what is left of a constant error of attitude, once the filter has followed it, hangs on small errors of gravity
-    assert apart.max() < 0.2
+    assert apart.max() < 0.3
     assert np.linalg.norm(linear - there, axis=0).max() < 0.05 * np.linalg.norm(there, axis=0).max()
 
 

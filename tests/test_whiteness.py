@@ -13,7 +13,7 @@ from icing_env.aircraft import load
 from icing_env.record import read
 from sim2real.channels import MEASURED
 from sim2real.diagnosis import _reconstructed
-from sim2real.evidence import SETTLE, whiten, whitening
+from sim2real.evidence import SETTLE, SIGMAS, whiten, whitening
 from sim2real.kalman import _within_steps, follow, gains, gust_noise, linearise
 from sim2real.predictor import TANGENT, innovations
 from sim2real.reconstruct import Reconstruction
@@ -37,11 +37,11 @@ def flown(folder, sigma: float, seed: int) -> Reconstruction:
     return _reconstructed([read(folder / "1.csv")], Baseline(load(), np.eye(1)), None)[0]
 
 
-@pytest.mark.parametrize("sigma", [0.02, 0.5, 1.5])
+@pytest.mark.parametrize("sigma", [SIGMAS[0], 0.5, 1.5])
 def test_innovations_of_a_known_aircraft_are_white(tmp_path, sigma):
     white = []
     for seed in range(SEEDS):
-        flight = flown(tmp_path, sigma if sigma > 0.02 else 0.0, seed)
+        flight = flown(tmp_path, sigma if sigma > SIGMAS[0] else 0.0, seed)
         gain = follow(flight, gains(flight, (sigma,))[0])
         left = innovations(flight, flight.parameters, gain.K)
         v = whiten(left, whitening(left[:, 0], gain, flight))[round(SETTLE / flight.dt) :, 0, : len(FELT)]
