@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -20,6 +20,7 @@ from sim2real.discrepancy import describe_unknown, described
 from sim2real.evidence import Evidence
 from sim2real.hypotheses import P_NONE, P_UNKNOWN, Posterior
 from sim2real.ladder import ladder
+from sim2real.limits import limits
 from sim2real.manoeuvre import next_manoeuvre
 from sim2real.paths import in_step
 from sim2real.reconstruct import Reconstruction, reconstruct
@@ -27,6 +28,7 @@ from sim2real.references import Baseline, fit_baseline
 from sim2real.remedy import Remedy, leading, remedy, resimulation, values_of
 from sim2real.rollout import Rollout, difference, flying_as
 from sim2real.side_by_side import each
+from sim2real.singles import EffectFit
 from sim2real.surfaces import placed
 from sim2real.terms import in_common
 from sim2real.weigh import Progress, fit
@@ -113,6 +115,8 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         progress("describing what the library lacks")
         unknown = describe_unknown(flights, candidates, evidences, baseline, posterior.tempering, described_by)
     change = remedy(explained, unknown)
+    progress("flying what these records could have revealed")
+    shown = limits(evidences, candidates, baseline, posterior.tempering, posterior.fits)
     progress("flying the records freely, before and after")
     sigma = float(np.mean([e.sigma_w for e in evidences]))
     training = gap.together(each(lambda i, f, e: gap.energies(f, change, e.sigma_w, seed + i, change.paths),
@@ -131,7 +135,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
                "regimes": regimes(evidences)},
         effects=[describe(name, posterior) for name, p in ranked(posterior) if p >= LISTED],
         not_testable=[{"effect": name, "why": why} for name, why in sorted(untestable.items())],
-        detection_limits=detection_limits(posterior),
+        detection_limits=detection_limits(posterior.fits, shown),
         unknown=None if unknown is None else unknown.answer(),
         gap={"training": {"before": gap.g(training.before, training.alone),
                           "after": gap.g(training.after, training.alone)},
@@ -190,10 +194,10 @@ def describe(name: str, posterior: Posterior) -> dict[str, Any]:
             "indistinguishable_from": list(posterior.classes[name])}
 
 
-def detection_limits(posterior: Posterior) -> dict[str, dict[str, Any]]:
+def detection_limits(fits: Mapping[str, EffectFit], shown: Mapping[str, float | None]) -> dict[str, dict[str, Any]]:
     """Smallest size of every tested effect that would have stood out (whitened distance 3.5 from none)."""
-    return {name: {"parameter": fit.family.parameter.name, "smallest": fit.smallest, "unit": fit.family.parameter.unit}
-            for name, fit in posterior.fits.items()}
+    return {name: {"parameter": fit.family.parameter.name, "smallest": shown[name], "unit": fit.family.parameter.unit}
+            for name, fit in fits.items()}
 
 
 def _next(flight: Reconstruction, candidates: Bank, posterior: Posterior, hypotheses: list[dict[str, Any]],

@@ -15,17 +15,18 @@ from icing_env.atmosphere import density
 from icing_env.errors import InputError, nearest
 from icing_env.parameters import UNITS
 from icing_env.record import FlightRecord, FloatArray, RecordMeta
-from sim2real.candidates import NUISANCE_STEP, Bank, parameter_rows
+from sim2real.candidates import Bank, parameter_rows
 from sim2real.channels import FED_BACK, G0, MEASURED, NOISE_FLOOR, SURFACES
 from sim2real.evidence import compare
 from sim2real.kalman import follow as follow_gain
 from sim2real.kalman import gains, gust_noise, linearise, roughness
+from sim2real.limits import FARTHEST, hiding, per_deviation, with_nuisances
 from sim2real.manoeuvre import MANOEUVRES, Manoeuvre, asked, flown
 from sim2real.paths import driven, follow, full_power
 from sim2real.predictor import TANGENT
 from sim2real.reconstruct import Reconstruction
 from sim2real.surfaces import EXACT
-from sim2real.weigh import FARTHEST, Progress
+from sim2real.weigh import Progress
 
 STEP, SLOW = 0.02, ("altitude", "thrust_left", "thrust_right")  # s between samples; channels sampled every fifth
 UPSET = {"beta": 0.35, "phi": 1.2, "theta": 0.8}  # rad, beyond which nobody plans to fly (assumed)
@@ -149,19 +150,15 @@ def evidence(flights: Sequence[Reconstruction], candidates: Bank, sigma: float, 
     """
     follows = np.array([nuisance.follows for nuisance in candidates.nuisances])
     moved = np.zeros((candidates.size, len(follows)))
-    first, found = slice(1, 1 + len(follows)), []
+    found = []
     for k in range(1 + SETTLING):
         progress(f"flying {candidates.size} variants through {len(flights)} manoeuvres, {1 + k} of {1 + SETTLING}")
         gram = np.sum([_signatures(flight, candidates, sigma, moved) for flight in flights], axis=0)
         found.append(gram)
-        inner, cross = gram[first, first], gram[:, first]
-        best = np.linalg.solve(inner + np.eye(len(follows)), (moved @ inner - cross).T).T
-        step = best - moved
-        along = cross @ step.T
-        left = gram + along + along.T + step @ inner @ step.T + best @ best.T
+        best, left = hiding(gram, np.eye(len(follows)), moved)
         moved = np.where(follows, np.clip(best, -FARTHEST, FARTHEST), 0.0)
-        moved[: first.stop] = 0.0  # the model and the nuisances themselves
-    return found[0], np.asarray(left)
+        moved[: 1 + len(follows)] = 0.0  # the model and the nuisances themselves
+    return found[0], left
 
 
 def _signatures(made: Reconstruction, candidates: Bank, sigma: float, moved: FloatArray) -> FloatArray:
@@ -177,12 +174,8 @@ def _signatures(made: Reconstruction, candidates: Bank, sigma: float, moved: Flo
     made = replace(made, noise=_apparent(made, sigma))
     gain = follow_gain(made, gains(made, (sigma,))[0])
     rows: NDArray = parameter_rows(made, candidates)
-    for nuisance, sizes in zip(candidates.nuisances, moved.T, strict=True):
-        if sizes.any():
-            nuisance.apply(rows, slice(None), made.power_from, sizes)
-    unit = np.ones(candidates.size)
-    unit[1 : 1 + len(candidates.nuisances)] = 1.0 / NUISANCE_STEP
-    return compare(made, rows, gain, _factor(made, gain.S)).gram * unit[:, None] * unit
+    with_nuisances(rows, candidates, moved, made.power_from)
+    return per_deviation(compare(made, rows, gain, _factor(made, gain.S)).gram, len(candidates.nuisances))
 
 
 def _apparent(made: Reconstruction, sigma: float) -> FloatArray:
