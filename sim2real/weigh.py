@@ -125,7 +125,7 @@ class _Weighing:
             if best.effects and best.unknown is None:
                 point = self._flying().settle(best.fit, there)
                 best, there = replace(best, fit=replace(best.fit, estimate=tuple(point.sizes))), point.nuisances
-            other = self._judged(best, there)
+            other = self._judged(best, np.clip(there, -FARTHEST, FARTHEST))
         step = nearer(there, self.candidates) - self.centre
         if not other and _length(self._gram(), step) <= RELINEARISE:
             return False
