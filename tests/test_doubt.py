@@ -1,0 +1,44 @@
+"""What is left for doubt: never all, never for no gap where there is one, mostly for the next in rank."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sim2real.generic import UnknownFit
+from sim2real.hypotheses import DOUBT, Hypothesis, doubted, normalised
+from sim2real.sets import SetFit
+
+SOMETHING = UnknownFit("x_force", 0.0, (("1", 1.0, 0.1),), 0.0, {})
+
+
+def some(logs: list[float]) -> list[Hypothesis]:
+    """No gap, and something unknown as often as there are further logs of evidence."""
+    return [Hypothesis(SetFit(), None if k == 0 else SOMETHING, -1.0 - k, log) for k, log in enumerate(logs)]
+
+
+@given(st.lists(st.floats(-400.0, 400.0), min_size=2, max_size=6))
+def test_doubt_keeps_the_order_of_what_is_certain_and_sums_to_one(logs):
+    found = normalised(some(logs), 0.0)
+    after = doubted(found)
+    assert sum(h.probability for h in after) == pytest.approx(1.0)
+    assert all(h.probability >= (1.0 - DOUBT) * before.probability - 1e-12
+               for before in found for h in after if h.log_posterior == before.log_posterior)
+    if found[0].probability > 0.6:
+        assert after[0].log_posterior == found[0].log_posterior
+
+
+def test_doubt_about_a_gap_is_for_other_explanations_of_it():
+    after = doubted(normalised(some([0.0, 300.0, 250.0, 200.0]), 0.0))
+    assert [h.log_evidence for h in after] == [300.0, 250.0, 200.0, 0.0]
+    assert after[0].probability < 1.0 - 0.4 * DOUBT
+    assert after[1].probability > 0.25 * DOUBT
+    assert after[-1].probability < 0.1 * DOUBT
+
+
+def test_doubt_about_no_gap_leaves_it_likely():
+    after = doubted(normalised(some([300.0, 0.0, -1.0]), 0.0))
+    assert after[0].unknown is None
+    assert after[0].probability > 1.0 - DOUBT + 0.2 * DOUBT * np.exp(-1.0)
