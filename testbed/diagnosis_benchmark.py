@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -25,6 +24,7 @@ from testbed.withheld.generate import generate
 from testbed.withheld.manoeuvres import DIAGNOSED
 from testbed.withheld.refly import refly
 from testbed.withheld.score import DETECTABLE, identifiable, score
+from testbed.workers import a_core_each
 
 QUICK, FULL = 150, 2400
 OPEN = 0o700  # of the key folder outside the diagnosis
@@ -33,6 +33,7 @@ LEDGER_COLUMNS = ("date", "set", "cases", "sources", "manifest", "top1", "top3",
 Progress = Callable[[str], None]
 
 
+@a_core_each()
 def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Progress,
             without: bool = False, rivals: bool = False) -> dict[str, Any]:
     """Draw (or finish drawing) a set in `out`, diagnose every case, fly the answers again, score.
@@ -135,7 +136,6 @@ def solve(case: Path, without: tuple[str, ...] = ()) -> dict[str, Any]:
 
     A record that is refused is an answer too: {"error": why}, wrong in every figure and counted as failed.
     """
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     from icing_env.record import read
     from sim2real.diagnosis import diagnose
     from testbed.commands.common import plain
@@ -152,7 +152,6 @@ def solve(case: Path, without: tuple[str, ...] = ()) -> dict[str, Any]:
 
 def solve_by(case: Path, rival: str) -> dict[str, Any]:
     """A rival's answer to one case's records, in the same form; {"error": why} where a record is refused."""
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     from icing_env.record import read
     from testbed.rivals.solve import diagnose
 

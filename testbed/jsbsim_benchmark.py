@@ -7,7 +7,6 @@ there already is kept, so that an interrupted run goes on.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
@@ -21,11 +20,13 @@ from testbed.withheld.jsbsim_cases import Design, designs, write_case
 from testbed.withheld.jsbsim_edit import data_root
 from testbed.withheld.jsbsim_score import score
 from testbed.withheld.jsbsim_tables import differences, differing
+from testbed.workers import a_core_each
 
 CASES = 16
 Progress = Callable[[str], None]
 
 
+@a_core_each()
 def measure(out: Path, cases: int | None, seed: int, workers: int, root: str | None,
             progress: Progress) -> dict[str, Any]:
     """Fly (or finish flying) a set in `out`, diagnose every case, score.
@@ -83,7 +84,6 @@ def _solve(out: Path, names: list[str], workers: int, progress: Progress) -> Non
 
 def solve(case: Path) -> dict[str, Any]:
     """The diagnosis of one case, as `icing diagnose --json` prints it; a refused record is {"error": why}."""
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     from icing_env.record import read
     from sim2real.diagnosis import diagnose
     from testbed.commands.common import plain

@@ -27,6 +27,7 @@ from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
 from testbed.withheld.plant import DT
 from testbed.withheld.separation import Distances, Geometry, distances, geometry
 from testbed.withheld.windows import Held, closures, held
+from testbed.workers import a_core_each
 
 TRIES, SMALLER = 8, 0.75  # an aircraft that departs gets a smaller effect
 SMALLEST_FACTOR = 0.01  # by which an unknown effect is scaled down
@@ -191,7 +192,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=None)
     parser.add_argument("--workers", type=int, default=1)
     given = parser.parse_args()
-    generate(given.out, given.cases, given.seed, given.workers, print)
+    with a_core_each():
+        generate(given.out, given.cases, given.seed, given.workers, print)
 
 
 if __name__ == "__main__":

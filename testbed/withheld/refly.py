@@ -25,6 +25,7 @@ from testbed.withheld.files import read_json, write_text
 from testbed.withheld.flights import Aircraft, recorded
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
 from testbed.withheld.windows import gap_of, held
+from testbed.workers import a_core_each
 
 FLOWN_AGAIN = ("single", "pair")  # tiers with an effect that the library holds
 Parts = tuple[tuple[str, str, float], ...]
@@ -113,7 +114,8 @@ def main() -> None:
         parser.add_argument(name, type=Path)
     parser.add_argument("--workers", type=int, default=1)
     given = parser.parse_args()
-    refly(given.answers, given.keys, given.out, given.workers, print)
+    with a_core_each():
+        refly(given.answers, given.keys, given.out, given.workers, print)
 
 
 if __name__ == "__main__":

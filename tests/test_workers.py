@@ -1,0 +1,23 @@
+"""Worker processes start with a core each, and the user's own settings stand."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+from testbed.workers import START, a_core_each
+
+
+def told(name: str) -> str | None:
+    return os.environ.get(name)
+
+
+def test_workers_start_with_it_and_nobody_else(monkeypatch):
+    for name in START:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("MALLOC_TRIM_THRESHOLD_", "1000")
+    with a_core_each(), ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        assert list(pool.map(told, START)) == ["1", START["MALLOC_MMAP_THRESHOLD_"], "1000"]
+    assert "OMP_NUM_THREADS" not in os.environ
+    assert os.environ["MALLOC_TRIM_THRESHOLD_"] == "1000"
