@@ -22,7 +22,7 @@ P_NONE, P_UNKNOWN, P_PAIRS, P_TRIPLES, P_BESIDE = 0.7, 0.03, 0.042, 0.0012, 0.00
 SAME_PLACE = 0.02  # of that where two members are faults of one device: another form of one is likelier (assumed)
 # Of the probability, that the evidence misleads: of 46 answers of 0.9 and more to gaps of development, 38 were right.
 DOUBT = 0.14
-NEXT = 0.5  # of the doubt, that it is one of those ranked next, each half as likely as the one before (assumed)
+NEXT = 0.8  # of the doubt, that it is one of those ranked next, each half as likely as the one before (assumed)
 KEPT = 1e-5  # sets of several effects less probable than this are dropped
 
 
@@ -236,14 +236,16 @@ def normalised(found: Sequence[Hypothesis], least: float = KEPT) -> tuple[Hypoth
 
 
 def doubted(found: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
-    """Hypotheses of which a share DOUBT of the probability goes to those ranked next, and as it did before any flight.
+    """Hypotheses of a gap, a share DOUBT of the probability for those ranked next, and as before any flight.
 
     What no model has, a filter's noise or a rival's form, is not in the evidence: where that misleads, it is mostly
-    the next in rank that is right, however far behind. What misleads about the kind of a gap makes no gap no likelier.
+    the next in rank that is right, however far behind. Where no gap is likeliest nothing is doubted, and what misleads
+    about the kind of a gap makes no gap no likelier.
     """
     order = np.argsort([-h.log_posterior for h in found], kind="stable")
-    gap = bool(found[order[0]].effects) or found[order[0]].unknown is not None
-    before = softmax([h.log_prior if h.effects or h.unknown or not gap else -np.inf for h in found])
+    if not found[order[0]].effects and found[order[0]].unknown is None:
+        return tuple(sorted(found, key=lambda h: -h.probability))
+    before = softmax([h.log_prior if h.effects or h.unknown else -np.inf for h in found])
     after = np.zeros(len(found))
     after[order] = 0.5 ** np.maximum(np.arange(len(found)), 1) * (np.arange(len(found)) > 0)
     after /= max(float(after.sum()), 1e-12)
