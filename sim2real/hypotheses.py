@@ -246,9 +246,10 @@ def doubted(found: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
     if not found[order[0]].effects and found[order[0]].unknown is None:
         return tuple(sorted(found, key=lambda h: -h.probability))
     before = softmax([h.log_prior if h.effects or h.unknown else -np.inf for h in found])
+    gaps = [int(i) for i in order if found[i].effects or found[i].unknown]
     after = np.zeros(len(found))
-    after[order] = 0.5 ** np.maximum(np.arange(len(found)), 1) * (np.arange(len(found)) > 0)
-    after /= max(float(after.sum()), 1e-12)
+    after[gaps[1:]] = 0.5 ** np.arange(1, len(gaps))
+    after = after / after.sum() if len(gaps) > 1 else before
     spread = DOUBT * (NEXT * after + (1.0 - NEXT) * before)
     out = [replace(h, probability=(1.0 - DOUBT) * h.probability + float(s))
            for h, s in zip(found, spread, strict=True)]
