@@ -19,11 +19,11 @@ from sim2real.evidence import Evidence, compare
 from sim2real.references import Baseline
 from sim2real.side_by_side import each
 from sim2real.singles import DETECTABLE, EffectFit
+from sim2real.weigh import nearer
 
 ROUNDS = 5  # times that all are flown
 MOST = 3.0  # times by which a size is changed at once
 EDGE = 1e-6  # of a range
-FARTHEST = 4.0  # standard deviations of a nuisance: what is beyond is no nuisance
 
 
 def limits(evidences: Sequence[Evidence], candidates: Bank, baseline: Baseline, tempering: float,
@@ -43,7 +43,6 @@ def limits(evidences: Sequence[Evidence], candidates: Bank, baseline: Baseline, 
     share = np.array([fits[name].smallest for name in names], float)
     share, n = (share - neutral) / reach, len(candidates.nuisances)
     moved, low, high = np.zeros((1 + n + len(names), n)), np.zeros(len(names)), np.full(len(names), np.inf)
-    follows = np.array([nuisance.follows for nuisance in candidates.nuisances])
     for turn in range(ROUNDS):
         own = tuple(replace(f, nodes=(size,), rows=(1 + n + i,))
                     for i, (f, size) in enumerate(zip(families, neutral + share * reach, strict=True)))
@@ -61,7 +60,7 @@ def limits(evidences: Sequence[Evidence], candidates: Bank, baseline: Baseline, 
         between = ((wanted <= low) | (wanted >= high)) & (low > 0.0) & np.isfinite(high)
         wanted = np.where(between, np.sqrt(low * np.where(between, high, 1.0)), wanted)
         grown = np.minimum(wanted, 1.0)
-        moved = np.where(follows, np.clip(best, -FARTHEST, FARTHEST), 0.0)
+        moved = nearer(best, candidates)
         moved[: 1 + n] = 0.0  # the model and the nuisances themselves
         moved[1 + n :] *= (grown / share)[:, None]
         never, share = hidden & (share > 1.0 - EDGE), grown

@@ -20,13 +20,13 @@ from sim2real.channels import FED_BACK, G0, MEASURED, NOISE_FLOOR, SURFACES
 from sim2real.evidence import compare
 from sim2real.kalman import follow as follow_gain
 from sim2real.kalman import gains, gust_noise, linearise, roughness
-from sim2real.limits import FARTHEST, hiding, per_deviation, with_nuisances
+from sim2real.limits import hiding, per_deviation, with_nuisances
 from sim2real.manoeuvre import MANOEUVRES, Manoeuvre, asked, flown
 from sim2real.paths import driven, follow, full_power
 from sim2real.predictor import TANGENT
 from sim2real.reconstruct import Reconstruction
 from sim2real.surfaces import EXACT
-from sim2real.weigh import Progress
+from sim2real.weigh import Progress, nearer
 
 STEP, SLOW = 0.02, ("altitude", "thrust_left", "thrust_right")  # s between samples; channels sampled every fifth
 UPSET = {"beta": 0.35, "phi": 1.2, "theta": 0.8}  # rad, beyond which nobody plans to fly (assumed)
@@ -148,16 +148,16 @@ def evidence(flights: Sequence[Reconstruction], candidates: Bank, sigma: float, 
         sigma: gust intensity expected, m/s.
         progress: told what is being done.
     """
-    follows = np.array([nuisance.follows for nuisance in candidates.nuisances])
-    moved = np.zeros((candidates.size, len(follows)))
+    n = len(candidates.nuisances)
+    moved = np.zeros((candidates.size, n))
     found = []
     for k in range(1 + SETTLING):
         progress(f"flying {candidates.size} variants through {len(flights)} manoeuvres, {1 + k} of {1 + SETTLING}")
         gram = np.sum([_signatures(flight, candidates, sigma, moved) for flight in flights], axis=0)
         found.append(gram)
-        best, left = hiding(gram, np.eye(len(follows)), moved)
-        moved = np.where(follows, np.clip(best, -FARTHEST, FARTHEST), 0.0)
-        moved[: 1 + len(follows)] = 0.0  # the model and the nuisances themselves
+        best, left = hiding(gram, np.eye(n), moved)
+        moved = nearer(best, candidates)
+        moved[: 1 + n] = 0.0  # the model and the nuisances themselves
     return found[0], left
 
 

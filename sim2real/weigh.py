@@ -209,7 +209,7 @@ def gather_about(flights: Sequence[Reconstruction], candidates: Bank, centre: Fl
 
 
 def nearer(centre: FloatArray, candidates: Bank) -> FloatArray:
-    """Nuisances that the model may be moved by: within reach, and none that it does not follow."""
+    """Nuisances [..., n] that the model may be moved by: within reach, and none that it does not follow."""
     follows = np.array([nuisance.follows for nuisance in candidates.nuisances])
     return np.where(follows, np.clip(centre, -FARTHEST, FARTHEST), 0.0)
 

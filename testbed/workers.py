@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 # NumPy reads the first when it is imported: set in a worker it would come too late, and as many threads as there are
 # cores, of every worker, would wait for one another. The others keep the C library from giving every large array back
-# to the system and asking for it anew, which costs a diagnosis 10 to 20 % of its time.
+# to the system and asking for it anew, which cost two diagnoses 10 and 20 % of their time.
 START = {"OMP_NUM_THREADS": "1", "MALLOC_MMAP_THRESHOLD_": str(2**32), "MALLOC_TRIM_THRESHOLD_": str(2**33)}
 
 
