@@ -7,9 +7,10 @@ import numpy as np
 from sim2real.bends import changes
 from sim2real.form import home
 from sim2real.hypotheses import Hypothesis, Posterior
-from sim2real.points import Flying, Point
+from sim2real.points import Flying
 from sim2real.sets import SetFit
 from sim2real.singles import EffectFit, fit_family
+from sim2real.steps import Point
 
 LEADING, LIKELY = 2, 0.02  # explanations that are flown again, and how probable they have to be
 CERTAIN = 0.05  # probability of no gap above which nothing is: sizes near zero have no likelihood of Gaussian shape

@@ -10,9 +10,9 @@ import numpy as np
 from icing_env.record import FloatArray
 from sim2real.form import Form, shares
 from sim2real.hypotheses import Hypothesis, Posterior
-from sim2real.points import Point, bounded_step, ranges, rooms
 from sim2real.sets import Modes, SetFit, integrate
 from sim2real.sizes import in_powers
+from sim2real.steps import Point, bounded_step, ranges, rooms
 
 
 def inherited(found: Sequence[Hypothesis], before: Sequence[Hypothesis], bases: Iterable[int],

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 from icing_env import effects
 from icing_env.record import FloatArray
@@ -21,71 +21,24 @@ from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.sets import SetFit
 from sim2real.side_by_side import each
+from sim2real.steps import (
+    FARTHEST,
+    Place,
+    Point,
+    Slopes,
+    descent,
+    ends,
+    holding,
+    promised,
+    ranges,
+    size_steps,
+    step_from,
+)
+from sim2real.valleys import lowest
 
-ROUNDS, TURNS = 10, 3  # steps with the same slopes by nuisances, and how often these are flown anew
-PATIENCE = 2  # steps that need not help
-SETTLED = 0.2  # gain of half the whitened square that is worth another round
+TURNS = 3  # how often slopes by nuisances are flown anew
 NEAR = 5.0  # such a gain, of a point so near that its slopes will do
 FAR = 1000.0  # whitened square above the linear fit's that makes another start worth a flight
-FARTHEST = 5.0  # standard deviations of a nuisance: what is beyond is no nuisance but a gap
-
-
-@dataclass(frozen=True)
-class Slopes:
-    """What a deviation of each nuisance makes of one record [N x channels, n], and generic terms [N x channels, terms].
-
-    Lent from point to point; their inner products are taken once.
-    """
-
-    rows: FloatArray
-    terms: FloatArray
-
-    @cached_property
-    def inner(self) -> FloatArray:
-        """Inner products [n, n]."""
-        return np.asarray(self.rows.T @ self.rows)
-
-    @cached_property
-    def onto(self) -> FloatArray:
-        """Inner products with the terms [n, terms]."""
-        return np.asarray(self.rows.T @ self.terms)
-
-    def beside(self, rows: FloatArray) -> FloatArray:
-        """Inner products of other rows [N x channels, m], then these."""
-        across = rows.T @ self.rows
-        return np.block([[rows.T @ rows, across], [across.T, self.inner]])
-
-
-@dataclass(frozen=True)
-class Point:
-    """A set at given sizes [k] and nuisances [n], flown.
-
-    cost: half the whitened square it leaves, the nuisances' prior included, tempered; slope and information: of sizes
-    (in ranges of their parameters), then nuisances; steps: of each size for its slope [k]; weights: of generic terms
-    flown with it, by row of the bank; rows: what it leaves of every record, then what these steps make of that, but for
-    the paths [N x channels, 1 + k]; slopes: the same of a deviation of each nuisance.
-    """
-
-    sizes: FloatArray
-    nuisances: FloatArray
-    cost: float
-    slope: FloatArray
-    information: FloatArray
-    steps: FloatArray
-    weights: Mapping[int, float] = field(default_factory=dict)
-    rows: Sequence[FloatArray] = ()
-    slopes: Sequence[Slopes] = ()
-
-    @property
-    def held(self) -> NDArray[np.intp]:
-        """Nuisances that have gone as far as they may."""
-        return np.flatnonzero(np.abs(self.nuisances) > FARTHEST - 1e-9)
-
-    def without_held(self) -> Point:
-        """The same with these as constants."""
-        at, slope = len(self.sizes) + self.held, self.slope.copy()
-        slope[at] = 0.0
-        return replace(self, slope=slope, information=_holding(at, self.information))
 
 
 @dataclass(frozen=True)
@@ -108,14 +61,25 @@ class Flying:
         best = self.point(fit, at, np.clip(start, -FARTHEST, FARTHEST), near)
         if 2.0 * best.cost > fit.misfit + FAR:
             best = min(best, self.point(fit, at, np.zeros_like(start), near), key=lambda point: point.cost)
-        best = self._descended(fit, best)
+        return self.settled(fit, self._descended(fit, best)).without_held()
+
+    def settled(self, fit: SetFit, best: Point) -> Point:
+        """The best that is reached from a point, slopes by nuisances flown anew on the way."""
         for _ in range(TURNS):
+            best = self.lower(fit, best)
             best = self.point(fit, best.sizes, best.nuisances)
-            promised = _promised(best, self._step(fit, best))
+            gain = promised(best, step_from(fit, best))
             best = self._descended(fit, best)
-            if promised < NEAR:
+            if gain < NEAR:
                 break
-        return best.without_held()
+        return best
+
+    def lower(self, fit: SetFit, best: Point) -> Point:
+        """The point, or one further along a valley where numbers of the aircraft are as they are here, if lower."""
+        place = lowest(self.flights[0], self.candidates, self.baseline.precision, fit, (best.sizes, best.nuisances))
+        if place is None:
+            return best
+        return min(best, self.point(fit, *place, best.slopes), key=lambda point: point.cost)
 
     @cached_property
     def near(self) -> list[Slopes]:
@@ -126,30 +90,41 @@ class Flying:
         made = self.courses.of_terms(self.candidates.terms)
         return [Slopes(own, terms) for own, (terms, _) in zip(rows, made, strict=True)]
 
-    def _step(self, fit: SetFit, point: Point) -> FloatArray:
-        return bounded_step(point.information, point.slope, *rooms(fit, point, ranges(fit)))
-
     def _descended(self, fit: SetFit, best: Point) -> Point:
-        """The best that is reached with the slopes by nuisances as they are: two to four rows a flight.
+        """The best that is reached with the slopes by nuisances as they are: two to four rows a flight."""
+        way = descent(fit, best)
+        try:
+            place = next(way)
+            while True:
+                place = way.send(self.point(fit, *place, best.slopes))
+        except StopIteration as arrived:
+            return cast(Point, arrived.value)
 
-        A size and the nuisance of the number that it changes make a narrow curved valley: a step along it climbs its
-        side first, and the next leads down again. So a few steps need not help (the watchdog of Chamberlain, Powell,
-        Lemarechal and Pedersen, Mathematical Programming Study 16, 1982).
-        """
-        at, share, waited, span = best, 1.0, 0, ranges(fit)
-        k = len(span)
-        for _ in range(ROUNDS):
-            step = share * self._step(fit, at)
-            if at is best and _promised(at, step) < SETTLED:
-                break
-            at = self.point(fit, at.sizes + step[:k] * span, at.nuisances + step[k:], best.slopes)
-            if at.cost < best.cost:
-                best, share, waited = at, 1.0, 0
-            elif waited < PATIENCE:
-                waited += 1
-            else:
-                at, share, waited = best, 0.5 * share, 0
+    def descended(self, fits: Sequence[SetFit], starts: Sequence[FloatArray]) -> list[Point]:
+        """The same of many sets side by side, each from its own sizes and nuisances [n], with the slopes of `near`."""
+        best = self.points([(fit, np.array(fit.estimate), start) for fit, start in zip(fits, starts, strict=True)])
+        best = self._lower(fits, best)
+        ways = [descent(fit, point) for fit, point in zip(fits, best, strict=True)]
+        waiting: dict[int, Place] = {}
+        told: dict[int, Point | None] = dict.fromkeys(range(len(fits)))
+        while told:
+            waiting = {}
+            for i, point in told.items():
+                try:
+                    waiting[i] = ways[i].send(point) if point else next(ways[i])
+                except StopIteration as arrived:
+                    best[i] = arrived.value
+            flown_now = self.points([(fits[i], *place) for i, place in waiting.items()])
+            told = dict(zip(waiting, flown_now, strict=True))
         return best
+
+    def _lower(self, fits: Sequence[SetFit], best: Sequence[Point]) -> list[Point]:
+        """`lower` of many sets side by side."""
+        places = [lowest(self.flights[0], self.candidates, self.baseline.precision, fit, (p.sizes, p.nuisances))
+                  for fit, p in zip(fits, best, strict=True)]
+        moved = iter(self.points([(fit, *place) for fit, place in zip(fits, places, strict=True) if place]))
+        return [min(p, next(moved), key=lambda point: point.cost) if place else p
+                for p, place in zip(best, places, strict=True)]
 
     def point(self, fit: SetFit, sizes: FloatArray, nuisances: FloatArray, slopes: Sequence[Slopes] = ()) -> Point:
         """A set flown at given sizes [k] and nuisances [n].
@@ -168,7 +143,45 @@ class Flying:
         for flight, own, left, lent in zip(self.flights, rows, made, slopes, strict=True):
             gram += lent.beside(left) / self.tempering
             gram[: 1 + k, : 1 + k] += path_gram(flight, own[: 1 + k], (), round(SETTLE / flight.dt)) / self.tempering
-        span = ranges(fit)
+        return replace(self._weighed(fit, sizes, nuisances, gram), rows=made, slopes=slopes)
+
+    def points(self, sets: Sequence[tuple[SetFit, FloatArray, FloatArray]]) -> list[Point]:
+        """Several sets at given sizes [k] and nuisances [n], flown side by side with the slopes of `near`.
+
+        What they leave of the records is not kept.
+        """
+        if not sets:
+            return []
+        counts = [1 + len(sizes) for _, sizes, _ in sets]
+        n, count = len(self.candidates.nuisances), 1 + sum(counts)
+        own = np.zeros((count, count - 1))  # the sets' rows and steps, from those flown and their departures
+        at = np.cumsum([1, *counts])
+        for first, after in zip(at, at[1:], strict=False):
+            own[[0, first], first - 1] = 1.0
+            own[np.arange(first + 1, after), np.arange(first, after - 1)] = 1.0
+            own[first, first : after - 1] = -1.0
+
+        def of_record(flight: Reconstruction, e: Evidence, lent: Slopes) -> FloatArray:
+            rows = np.concatenate([flight.parameters, *(
+                _rows(flight, self.candidates, fit, sizes, size_steps(fit, sizes), nuisances)[: 1 + len(sizes)]
+                for fit, sizes, nuisances in sets)])
+            made = flown(flight, rows, (), e.gain, e.factor, keep=range(count))
+            inner = made.gram + path_gram(flight, rows, (), round(SETTLE / flight.dt))
+            across = own.T @ (made.rows.T @ lent.rows)
+            return np.asarray(np.block([[own.T @ inner @ own, across], [across.T, lent.inner]]))
+
+        total = np.sum(each(of_record, self.flights, self.evidences, self.near), axis=0) / self.tempering
+        out = []
+        for (fit, sizes, nuisances), first, after in zip(sets, at, at[1:], strict=False):
+            chosen = np.r_[first - 1 : after - 1, count - 1 : count - 1 + n]
+            point = self._weighed(fit, sizes, nuisances, total[np.ix_(chosen, chosen)])
+            out.append(replace(point, slopes=self.near))
+        return out
+
+    def _weighed(self, fit: SetFit, sizes: FloatArray, nuisances: FloatArray, gram: FloatArray) -> Point:
+        """A point from the inner products of what it leaves, of a step of each size and of a nuisance's deviation."""
+        k, n = len(sizes), len(nuisances)
+        steps, span = size_steps(fit, sizes), ranges(fit)
         unit = np.concatenate([[1.0], span / steps if k else [], np.ones(n)])
         gram = gram * unit[:, None] * unit
         prior = self.baseline.precision
@@ -177,7 +190,7 @@ class Flying:
         information[k:, k:] += prior
         information[:k, :k] += np.eye(k)  # a size moves no farther than its range
         cost = 0.5 * (gram[0, 0] + nuisances @ prior @ nuisances)
-        return Point(sizes, nuisances, float(cost), slope, information, steps, rows=made, slopes=slopes)
+        return Point(sizes, nuisances, float(cost), slope, information, steps)
 
     def left_over(self, fit: SetFit, point: Point) -> Remainder:
         """What a set leaves where it was flown, everything in it free to give way.
@@ -228,60 +241,8 @@ class Flying:
 
         total, taken = np.sum(each(of_record, self.flights, self.evidences, self.courses.along), axis=0)
         prior, nothing = self.baseline.precision, np.zeros_like(self.baseline.precision)
-        return [reduce(_holding(1 + point.held, with_prior(gram, self.candidates, prior, point.nuisances)),
+        return [reduce(holding(1 + point.held, with_prior(gram, self.candidates, prior, point.nuisances)),
                        self.candidates, nothing) for gram in (total, total - taken)]
-
-
-def _holding(rows: NDArray[np.intp], gram: FloatArray) -> FloatArray:
-    """Inner products where some rows are constants that give way no more."""
-    out = gram.copy()
-    out[rows], out[:, rows] = 0.0, 0.0
-    out[rows, rows] = 1.0
-    return out
-
-
-def ranges(fit: SetFit) -> FloatArray:
-    """Of each parameter [k]."""
-    return np.array([f.parameter.high - f.parameter.low for f in fit.families])
-
-
-def ends(fit: SetFit, point: Point) -> list[int]:
-    """Sizes that are at an end of their ranges, by row of what a set leaves."""
-    low, high = rooms(fit, point, ranges(fit))
-    return [1 + m for m in range(len(point.sizes)) if low[m] > -1e-9 or high[m] < 1e-9]
-
-
-def rooms(fit: SetFit, point: Point, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """How far sizes (in units of `unit` [k]) and nuisances may still go, down and up [k + n]."""
-    low, high = (np.array([getattr(f.parameter, end) for f in fit.families]) for end in ("low", "high"))
-    ends = np.sort([(low - point.sizes) / unit, (high - point.sizes) / unit], axis=0)
-    nuisances = np.clip(point.nuisances, -FARTHEST, FARTHEST)
-    return np.r_[np.minimum(ends[0], 0.0), -FARTHEST - nuisances], np.r_[np.maximum(ends[1], 0.0), FARTHEST - nuisances]
-
-
-def bounded_step(information: FloatArray, slope: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """The step between `low` and `high` that lowers half the whitened square most, taken as a quadratic."""
-    step = -np.linalg.solve(information, slope)
-    if np.all((low <= step) & (step <= high)):
-        return np.asarray(step)
-    root = np.linalg.cholesky(information)
-    return np.asarray(lsq_linear(root.T, -np.linalg.solve(root, slope), (low - 1e-12, high + 1e-12), method="bvls").x)
-
-
-def _promised(point: Point, step: FloatArray) -> float:
-    """By how much a step would lower half the whitened square."""
-    return -float(step @ point.slope) - 0.5 * float(step @ point.information @ step)
-
-
-def size_steps(fit: SetFit, sizes: FloatArray) -> FloatArray:
-    """Step of each size for its slope: about its uncertainty, inwards."""
-    out = np.zeros(len(sizes))
-    for m, (family, size) in enumerate(zip(fit.families, sizes, strict=True)):
-        low, high = family.parameter.low, family.parameter.high
-        spread = 0.0 if fit.covariance is None else float(np.sqrt(fit.covariance[m, m]))
-        step = min(max(spread, 1e-3 * (high - low)), 0.1 * (high - low))
-        out[m] = step if size + step <= high else -step
-    return out
 
 
 def _rows(flight: Reconstruction, candidates: Bank, fit: SetFit, sizes: FloatArray, steps: FloatArray,

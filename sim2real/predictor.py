@@ -25,6 +25,7 @@ from sim2real.channels import FED_BACK, MEASURED, SURFACES
 from sim2real.reconstruct import Reconstruction
 
 QUICK = 4  # rows at a time that the compiler turns into vector instructions
+LOST = 1e9  # what a row that flew to no numbers is off by, in any unit
 ANGLES = ("phi", "theta")  # corrected through the quaternion
 TANGENT = (*STATES, *ANGLES)
 # over whole arrays the kernels' own text runs as plain NumPy
@@ -201,7 +202,20 @@ def with_spare(flight: Reconstruction, parameters: NDArray, gain: FloatArray,
     spare = -count % QUICK if count % QUICK > 1 and gain.ndim == 3 else 0
     flown = Predictor(flight, np.take(parameters, [*range(count), *[count - 1] * spare]))
     flown.place(0)
-    return flown.fly(len(flight.time) - 1, gain=gain, pushes=pushes)
+    return _lost(flown.fly(len(flight.time) - 1, gain=gain, pushes=pushes), np.isfinite(flight.measured[1:]))
+
+
+def _lost(left: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
+    """The same where a row that flew to no numbers at all is as far as can be from what was measured.
+
+    Else it would leave nothing, like a channel that was not measured, and be the best explanation of any record.
+    """
+    for channel in np.flatnonzero(known.any(axis=0)):
+        last = np.flatnonzero(known[:, channel])[-1]
+        for row in np.flatnonzero(~np.isfinite(left[last, :, channel])):
+            gone = known[:, channel] & ~np.isfinite(left[:, row, channel])
+            left[gone, row, channel] = LOST
+    return left
 
 
 def predicted(flight: Reconstruction, left: FloatArray) -> FloatArray:

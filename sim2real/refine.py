@@ -52,8 +52,9 @@ from sim2real.hypotheses import (
     set_prior,
 )
 from sim2real.other_form import WORTH, Bent, flown_squares, flown_unknown, other_form
-from sim2real.points import Flying, Point
+from sim2real.points import Flying
 from sim2real.sets import SetFit
+from sim2real.steps import Point
 from sim2real.terms import Term
 
 MOST = 9  # explanations flown again; what looks better then and has not been flown is not believed
@@ -73,8 +74,8 @@ def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior:
     search = _Search(flying, start, posterior)
     search.fly([search.nothing_at_all(), *(search.found.index(h) for h in leading(posterior))])
     search.fly(search.companions())
-    while len(search.points) < MOST and (best := search.best()) not in search.points:
-        search.fly([search.first_of(best)])
+    while len(search.points) < MOST and (following := search.following()) is not None:
+        search.fly([following])
     return search.posterior()
 
 
@@ -106,17 +107,18 @@ class _Search:
         known = [i for i, h in enumerate(self.found) if h.unknown is None]
         return max(known, key=lambda i: self.found[i].log_posterior)
 
-    def first_of(self, i: int) -> int:
-        """A single effect of set `i` that was not flown yet and explains a good part of it, the most probable first.
+    def following(self) -> int | None:
+        """What to fly next: of the best set, unless that was flown, else its members alone; None if all of them were.
 
-        What flying a single effect corrects, all sets that hold it inherit. If there is none, the set itself.
+        A single effect of it that explains a good part goes first: what flying that corrects, all sets that hold it
+        inherit. And one that is alone enough in another form would not be known by the company that it was flown in.
         """
-        bare = self.before[self.nothing_at_all()].log_posterior
-        least = PART * (self.found[i].log_posterior - bare)
+        best, bare = self.best(), self.before[self.nothing_at_all()].log_posterior
+        least = PART * (self.found[best].log_posterior - bare) if best not in self.points else -np.inf
         alone = [j for j, h in enumerate(self.found) if j not in self.points and h.unknown is None
-                 and len(h.effects) == 1 and set(h.effects) < set(self.found[i].effects)
+                 and len(h.effects) == 1 and set(h.effects) < set(self.found[best].effects)
                  and h.log_posterior - bare > least]  # fmt: skip
-        return max(alone, key=lambda j: self.found[j].log_posterior, default=i)
+        return max(alone, key=lambda j: self.found[j].log_posterior, default=None if best in self.points else best)
 
     def _fly(self, i: int) -> None:
         h = self.found[i]

@@ -23,12 +23,13 @@ from sim2real.predictor import innovations, predicted
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.refine import refine
+from sim2real.screen import Points, screen, screened
 from sim2real.side_by_side import each
 from sim2real.terms import pushes
 
 SETTLING, SETTLED = 4, 3.0  # steps towards the best nuisances, and the whitened length of a step that ends them
 RELINEARISE = 8.0  # whitened distance of the fitted nuisances beyond which all is flown again about them
-MOVES = 3  # times at most
+AGAIN = 2  # times at most
 CALMER = 0.6  # ratio of temperings below which the leading explanations are flown again
 UNLIKE = 0.25  # log of the ratio of innovation variances beyond which another gain is worth a flight: two of SIGMAS
 FIRST_ORDER = 3.0  # least tempering where another simulator's accelerations stand in for its flight (assumed)
@@ -52,10 +53,10 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
     found = _Weighing(flights, candidates, baseline, untestable, centre)
     progress(f"flying {candidates.size} variants along {len(flights)} records")
     found.gather(known)
-    for _ in range(MOVES):
-        if not found.moved():
+    for _ in range(AGAIN):
+        if not found.judged():
             break
-        progress("flying the variants again about the fitted model")
+        progress("flying the variants again, gusts judged with the best explanation")
         found.gather(found.known)
     progress("looking for what no generic term follows")
     found.weigh_courses()
@@ -85,11 +86,13 @@ class _Weighing:
         self.untestable, self.centre = untestable, centre
         self.known: list[Gain] | None = None
         self.quiet = dict(untestable)
+        self.points: Points = {}
 
     def gather(self, known: Sequence[Gain] | None, tempering: float | None = None) -> None:
         """Fly the variants about the centre, with gains (and tempering) where known, and weigh what they say."""
         self.evidences = gather_about(self.flights, self.candidates, self.centre, known)
         self.along = [Course(e) for e in self.evidences]
+        self.points = {}
         self._weigh(tempering)
 
     def weigh_courses(self) -> None:
@@ -100,7 +103,11 @@ class _Weighing:
 
     def _weigh(self, tempering: float | None, free: Sequence[UnknownFit] = ()) -> None:
         self.quiet = dict(self.untestable)
-        self.posterior = weigh(self.evidences, self.candidates, self.quiet, self.baseline, self.centre, tempering, free)
+        linear = weigh(self.evidences, self.candidates, self.quiet, self.baseline, self.centre, tempering, free)
+        if not self.points or linear.tempering != self.posterior.tempering:
+            self.posterior = linear
+            self.points = screen(self._flying(), self.start, linear)
+        self.posterior = screened(linear, self.points)
 
     def _gram(self) -> FloatArray:
         """Inner products of all records, tempered, the nuisances' prior among them."""
@@ -108,29 +115,36 @@ class _Weighing:
                           self.centre)  # fmt: skip
 
     def start(self, known: Hypothesis) -> FloatArray:
-        """Best nuisances [n] of an explanation, as far as the linear fit knows."""
+        """Best nuisances [n] of an explanation: where it was flown, or as far as the linear fit knows."""
+        if known.unknown is None and known.effects in self.points:
+            return self.points[known.effects].nuisances
         return self.centre + nuisance_mean(self._gram(), self.candidates, known.weights)
 
     def _flying(self) -> Flying:
         t = self.posterior.tempering
         return Flying(self.flights, self.candidates, self.evidences, self.baseline, t, Courses(self.along, t))
 
-    def moved(self) -> bool:
-        """Move the centre to where the likeliest explanation has it, if that or its gains are far from what was flown.
+    def judged(self) -> bool:
+        """Find the gains of the likeliest explanation, and where the model is flown beside something unknown.
 
-        A known set is fitted where it lies; beside something unknown the linear fit has to do.
+        Returns:
+            Whether they are far enough from what was flown to fly the variants again.
         """
-        best, there, other = self.posterior.best, self.start(self.posterior.best), False
-        if leading(self.posterior):
-            if best.effects and best.unknown is None:
-                point = self._flying().settle(best.fit, there)
-                best, there = replace(best, fit=replace(best.fit, estimate=tuple(point.sizes))), point.nuisances
-            other = self._judged(best, np.clip(there, -FARTHEST, FARTHEST))
-        step = nearer(there, self.candidates) - self.centre
+        best = self._likeliest()
+        if not best.effects and best.unknown is None:
+            return False
+        there = self.start(best)
+        other = self._judged(best, np.clip(there, -FARTHEST, FARTHEST))
+        step = np.zeros_like(there) if best.effects else nearer(there, self.candidates) - self.centre
         if not other and _length(self._gram(), step) <= RELINEARISE:
             return False
         self.centre = self.centre + step
         return True
+
+    def _likeliest(self) -> Hypothesis:
+        """The likeliest explanation that was flown, or unknown alone."""
+        return next(h for h in self.posterior.hypotheses if (h.unknown is None and h.effects in self.points)
+                    or (h.unknown is not None and not h.effects))
 
     def _judged(self, best: Hypothesis, nuisances: FloatArray) -> bool:
         """Find the gains with an explanation in the model; whether they are worth a flight."""

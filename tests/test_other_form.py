@@ -19,10 +19,11 @@ from sim2real.evidence import gather
 from sim2real.generic import fit_unknown
 from sim2real.home_terms import gain
 from sim2real.other_form import Bent, bring, flown_unknown
-from sim2real.points import FARTHEST, Flying, bounded_step
+from sim2real.points import Flying
 from sim2real.reconstruct import Reconstruction, reconstruct
 from sim2real.references import Baseline
 from sim2real.sets import SetFit
+from sim2real.steps import FARTHEST, bounded_step
 from sim2real.terms import BEYOND, GENERIC, Term, in_common, pushes
 from testbed.flight import fly
 

@@ -15,10 +15,11 @@ from sim2real.corrections import corrected
 from sim2real.courses import Course, Courses
 from sim2real.evidence import gather
 from sim2real.hypotheses import Hypothesis
-from sim2real.points import Flying, Point, bounded_step, rooms
+from sim2real.points import Flying
 from sim2real.reconstruct import reconstruct
 from sim2real.references import Baseline
 from sim2real.sets import SetFit
+from sim2real.steps import Point, bounded_step, rooms
 from sim2real.terms import in_common, pushes
 from testbed.flight import fly
 
