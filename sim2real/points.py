@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import cast
@@ -36,6 +37,7 @@ from sim2real.steps import (
 )
 from sim2real.valleys import lowest
 
+SIDE_BY_SIDE = 6  # steps with the same slopes where many sets take them together
 TURNS = 3  # how often slopes by nuisances are flown anew
 NEAR = 5.0  # such a gain, of a point so near that its slopes will do
 FAR = 1000.0  # whitened square above the linear fit's that makes another start worth a flight
@@ -105,17 +107,14 @@ class Flying:
         best = self.points([(fit, np.array(fit.estimate), start) for fit, start in zip(fits, starts, strict=True)])
         best = self._lower(fits, best)
         ways = [descent(fit, point) for fit, point in zip(fits, best, strict=True)]
-        waiting: dict[int, Place] = {}
         told: dict[int, Point | None] = dict.fromkeys(range(len(fits)))
-        while told:
-            waiting = {}
+        for _ in range(SIDE_BY_SIDE):
+            waiting: dict[int, Place] = {}
             for i, point in told.items():
-                try:
+                with suppress(StopIteration):  # which says that it has arrived
                     waiting[i] = ways[i].send(point) if point else next(ways[i])
-                except StopIteration as arrived:
-                    best[i] = arrived.value
-            flown_now = self.points([(fits[i], *place) for i, place in waiting.items()])
-            told = dict(zip(waiting, flown_now, strict=True))
+            told = dict(zip(waiting, self.points([(fits[i], *place) for i, place in waiting.items()]), strict=True))
+            best = [min(point, told.get(i) or point, key=lambda p: p.cost) for i, point in enumerate(best)]
         return best
 
     def _lower(self, fits: Sequence[SetFit], best: Sequence[Point]) -> list[Point]:
@@ -148,7 +147,7 @@ class Flying:
     def points(self, sets: Sequence[tuple[SetFit, FloatArray, FloatArray]]) -> list[Point]:
         """Several sets at given sizes [k] and nuisances [n], flown side by side with the slopes of `near`.
 
-        What they leave of the records is not kept.
+        What they leave of the records is not kept. Paths are judged with the recording's low pass as the model has it.
         """
         if not sets:
             return []

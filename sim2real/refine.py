@@ -67,7 +67,6 @@ def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior:
     """The posterior with its leading explanations fitted where they lie, until the best of them has been flown.
 
     Args:
-        flying: the records, and what flying along them takes.
         start: best nuisances [n] of a hypothesis as far as the linear fit knows.
         posterior: of the linear fit.
     """
@@ -110,14 +109,13 @@ class _Search:
     def following(self) -> int | None:
         """What to fly next: of the best set, unless that was flown, else its members alone; None if all of them were.
 
-        A single effect of it that explains a good part goes first: what flying that corrects, all sets that hold it
-        inherit. And one that is alone enough in another form would not be known by the company that it was flown in.
+        A single effect of it that explains a good part goes first: what flying that corrects, all its sets inherit.
         """
         best, bare = self.best(), self.before[self.nothing_at_all()].log_posterior
         least = PART * (self.found[best].log_posterior - bare) if best not in self.points else -np.inf
         alone = [j for j, h in enumerate(self.found) if j not in self.points and h.unknown is None
                  and len(h.effects) == 1 and set(h.effects) < set(self.found[best].effects)
-                 and h.log_posterior - bare > least]  # fmt: skip
+                 and h.log_posterior - bare > least]
         return max(alone, key=lambda j: self.found[j].log_posterior, default=None if best in self.points else best)
 
     def _fly(self, i: int) -> None:

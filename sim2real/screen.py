@@ -21,7 +21,9 @@ from sim2real.points import Flying
 from sim2real.steps import FARTHEST, Point
 
 SETS, TURNS = 8, 3  # sets of several flown side by side, and how often, until one that was flown looks best
-CLOSE, MOST = 15.0, 4  # log likelihood from the best at which slopes are flown anew, and for how many (assumed)
+# Slopes are flown anew for up to MOST that are within so much log likelihood, or such a share of what is explained, of
+# the best (assumed).
+CLOSE, SHARE, MOST = 15.0, 0.3, 4
 Points = Mapping[tuple[str, ...], Point]
 
 
@@ -47,7 +49,8 @@ def screen(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior:
             break
         fly(promising)
     best = min(point.cost for point in points.values())
-    close = [names for names, point in points.items() if point.cost < best + CLOSE]
+    far = best + max(CLOSE, SHARE * (points[()].cost - best))
+    close = [names for names, point in points.items() if point.cost < far]
     if len(close) > 1:
         for names in sorted(close, key=lambda names: points[names].cost)[:MOST]:
             points[names] = flying.settled(known[names].fit, points[names])
