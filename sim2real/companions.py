@@ -66,3 +66,14 @@ def together(one: SetFit, second: EffectFit) -> SetFit:
                   (*one.estimate, second.estimate), (*one.low95, second.low95), (*one.high95, second.high95),
                   np.block([[covariance, np.zeros((1, 1))], [np.zeros((1, 1)), spread]]),
                   (one.weights or {}) | second.weights, second.misfit)  # fmt: skip
+
+
+def without(fit: SetFit, m: int) -> SetFit:
+    """A set without one member, the others' sizes as they are."""
+    kept = [j for j in range(len(fit.families)) if j != m]
+    families = tuple(fit.families[j] for j in kept)
+    covariance = None if fit.covariance is None else fit.covariance[np.ix_(kept, kept)]
+    estimate, low95, high95 = (tuple(of[j] for j in kept) for of in (fit.estimate, fit.low95, fit.high95))
+    rows = {row for family in families for row in family.rows}
+    weights = {row: w for row, w in (fit.weights or {}).items() if row in rows}
+    return SetFit(families, 0.0, estimate, low95, high95, covariance, weights, fit.misfit)

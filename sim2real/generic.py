@@ -6,7 +6,7 @@ Linear-Gaussian terms (constant, linear, quadratic, drifting) whose coefficients
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from icing_env.jit import entry
 from icing_env.record import FloatArray
 from sim2real.candidates import Bank
 from sim2real.sets import SetFit
-from sim2real.terms import Term
+from sim2real.terms import Term, in_what_is_left
 
 SCALES = (0.5, 1.0, 2.0)  # sizes of generic terms, in their own unit (assumed)
 IN_STEP = 0.03  # of the unit of a channel's lag: 3 ms, by which channels are out of step for no reason (assumed)
@@ -103,6 +103,12 @@ def fit_unknown(reduced: FloatArray, bank: Bank) -> list[UnknownFit]:
 
 
 Way = tuple[float, float, list[int]]  # log evidence, the likeliest scale, and terms of a way to describe a component
+
+
+def fit_unknown_left(left: FloatArray, bank: Bank) -> list[UnknownFit]:
+    """The same of what a flown set leaves (row 0, then generic terms); weights by row of the bank."""
+    return [replace(u, weights={bank.terms[row - 1].row: w for row, w in u.weights.items()})
+            for u in fit_unknown(left, replace(bank, terms=in_what_is_left(bank.terms)))]
 
 
 def _one(T: FloatArray, t: FloatArray) -> Way:

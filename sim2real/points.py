@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -38,6 +38,7 @@ from sim2real.steps import (
 from sim2real.valleys import lowest
 
 SIDE_BY_SIDE = 6  # steps with the same slopes where many sets take them together
+HOPELESS = 100.0  # log likelihood from the best, and half of what that explains, beyond which nothing is tried further
 TURNS = 3  # how often slopes by nuisances are flown anew
 NEAR = 5.0  # such a gain, of a point so near that its slopes will do
 FAR = 1000.0  # whitened square above the linear fit's that makes another start worth a flight
@@ -115,7 +116,15 @@ class Flying:
                     waiting[i] = ways[i].send(point) if point else next(ways[i])
             told = dict(zip(waiting, self.points([(fits[i], *place) for i, place in waiting.items()]), strict=True))
             best = [min(point, told.get(i) or point, key=lambda p: p.cost) for i, point in enumerate(best)]
+            told = self._hopeful(fits, told, [point.cost for point in best])
         return best
+
+    def _hopeful(self, fits: Sequence[SetFit], told: Mapping[int, Point | None], costs: Sequence[float]
+                 ) -> dict[int, Point | None]:  # fmt: skip
+        """Those that may still come near the best: most effects explain next to nothing of a large gap."""
+        far = max(min(costs) + HOPELESS, 0.5 * (min(costs) + float(np.median(costs))))
+        return {i: p for i, p in told.items()
+                if p and (p.cost < far or p.cost - promised(p, step_from(fits[i], p)) < far)}
 
     def _lower(self, fits: Sequence[SetFit], best: Sequence[Point]) -> list[Point]:
         """`lower` of many sets side by side."""

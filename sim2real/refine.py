@@ -8,7 +8,7 @@ lost. Beside the best single effect, where it was flown, the whole library is th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
 from sim2real.any_course import beside, with_courses
-from sim2real.companions import companions, leading, together
+from sim2real.companions import companions, leading, together, without
 from sim2real.corrections import corrected, inherited
 from sim2real.courses import Remainder
 from sim2real.form import (
@@ -38,7 +38,7 @@ from sim2real.form import (
     squares,
     with_terms,
 )
-from sim2real.generic import UnknownFit, fit_unknown
+from sim2real.generic import UnknownFit, fit_unknown_left
 from sim2real.home_terms import given
 from sim2real.hypotheses import (
     P_BESIDE,
@@ -55,11 +55,11 @@ from sim2real.other_form import WORTH, Bent, flown_squares, flown_unknown, other
 from sim2real.points import Flying
 from sim2real.sets import SetFit
 from sim2real.steps import Point
-from sim2real.terms import Term
+from sim2real.terms import in_what_is_left
 
-MOST = 9  # explanations flown again; what looks better then and has not been flown is not believed
+MOST = 12  # explanations flown again; what looks better then and has not been flown is not believed
 PART = 0.1  # of what a set is more probable than nothing (in logarithms), that an effect flown for its sake is alone
-TAKEN = 10.0  # whitened square above luck, that generic terms take of what leaves room for a companion (assumed)
+TAKEN = 4.0  # whitened square above luck, that generic terms take of what leaves room for a companion (assumed)
 FEW_PLACES = 5  # components at which courses of time are freed together
 
 
@@ -67,8 +67,7 @@ def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior:
     """The posterior with its leading explanations fitted where they lie, until the best of them has been flown.
 
     Args:
-        start: best nuisances [n] of a hypothesis as far as the linear fit knows.
-        posterior: of the linear fit.
+        start: nuisances [n] that a hypothesis is settled from.
     """
     search = _Search(flying, start, posterior)
     search.fly([search.nothing_at_all(), *(search.found.index(h) for h in leading(posterior))])
@@ -88,6 +87,7 @@ class _Search:
         self.left: dict[int, Remainder] = {}
         self.bent: dict[int, Bent] = {}
         self.generic: dict[int, list[UnknownFit]] = {}
+        self.beginning: dict[int, FloatArray] = {}  # nuisances that sets within a flown one start from
         self.added: set[int] = set()  # proposed beside a flown one: no linear fit to correct others by
         self.nothing, self.noise = float(posterior.reduced[0, 0]), np.inf
         if posterior.tempering > 1.0:
@@ -107,25 +107,35 @@ class _Search:
         return max(known, key=lambda i: self.found[i].log_posterior)
 
     def following(self) -> int | None:
-        """What to fly next: of the best set, unless that was flown, else its members alone; None if all of them were.
+        """What to fly next: of the best set, unless that was flown, else what is left of it without one member.
 
-        A single effect of it that explains a good part goes first: what flying that corrects, all its sets inherit.
+        A single effect that explains a good part goes first: what flying it corrects, all its sets inherit.
         """
         best, bare = self.best(), self.before[self.nothing_at_all()].log_posterior
-        least = PART * (self.found[best].log_posterior - bare) if best not in self.points else -np.inf
+        if best in self.points:
+            return next((i for i in self._less(best) if i not in self.points), None)
+        least = PART * (self.found[best].log_posterior - bare)
         alone = [j for j, h in enumerate(self.found) if j not in self.points and h.unknown is None
                  and len(h.effects) == 1 and set(h.effects) < set(self.found[best].effects)
                  and h.log_posterior - bare > least]
-        return max(alone, key=lambda j: self.found[j].log_posterior, default=None if best in self.points else best)
+        return max(alone, key=lambda j: self.found[j].log_posterior, default=best)
+
+    def _less(self, i: int) -> list[int]:
+        """Indices of a flown set without each of its members, from where it settled if they were not flown yet."""
+        fit = self.found[i].fit
+        found = [self._propose(without(fit, m)) for m in range(len(fit.families)) if len(fit.families) > 1]
+        self.beginning = dict.fromkeys(found, self.points[i].nuisances) | self.beginning
+        return found
 
     def _fly(self, i: int) -> None:
         h = self.found[i]
-        self.points[i] = self.flying.settle(h.fit, self.start(h))
+        self.points[i] = self.flying.settle(h.fit, self.beginning[i] if i in self.beginning else self.start(h))
         h = corrected(h, self.points[i], self.linear)
         self.left[i] = self.flying.left_over(h.fit, self.points[i])
         left = self.left[i].reduced()
         places = home(h.effects) if h.effects else {u.component for u in self.linear.courses if u.log_evidence > 0.0}
-        self.generic[i] = with_courses(self._fit_unknown(left), beside(self.flying.courses, self.left[i], places))
+        fits = fit_unknown_left(left, self.flying.candidates)
+        self.generic[i] = with_courses(fits, beside(self.flying.courses, self.left[i], places))
         if h.effects:
             h = replace(h, form=self._form(i, h, left), instead=None)
         else:
@@ -145,7 +155,7 @@ class _Search:
     def _room(self, i: int, h: Hypothesis, left: FloatArray) -> tuple[list[int], FloatArray]:
         """Rows of the generic terms at home of a set in what it leaves (`left`), and what `room` there is for each."""
         bank, raw = self.flying.candidates, self.linear.raw
-        own = own_terms(h.effects, _moved(bank.terms))
+        own = own_terms(h.effects, in_what_is_left(bank.terms))
         rows = [term.row for term in own]
         whole = raw.diagonal()[[bank.terms[row - 1].row for row in rows]]
         kept = left.diagonal()[rows] / np.maximum(whole, 1e-9)
@@ -195,14 +205,14 @@ class _Search:
 
     def _ranked(self, effects: int | None = None) -> list[int]:
         """Flown hypotheses, the best first; those of so many effects alone if given."""
-        chosen = [i for i in self.points if effects is None or len(self.found[i].effects) == effects]
+        chosen = [i for i in self.points if effects in (None, len(self.found[i].effects))]
         return sorted(chosen, key=lambda i: -self.found[i].log_posterior)
 
     def companions(self) -> list[int]:
         """Pairs of the best single effects, where they were flown: with what may be forgiven them, and as they are."""
         alone = self._ranked(1)
-        best = dict.fromkeys([*alone[:1], *sorted(alone, key=lambda i: -self.found[i].log_evidence)[:1]])
-        return [j for i in best for j in self._companions(i)]
+        as_it_is = sorted(alone, key=lambda i: -self.found[i].log_evidence)
+        return [j for i in dict.fromkeys(alone[:1] + as_it_is[:1]) for j in self._companions(i)]
 
     def _companions(self, i: int) -> list[int]:
         first, left = self.found[i], float(self.left[i].reduced()[0, 0])
@@ -212,7 +222,7 @@ class _Search:
                 for fit in companions(self.flying, self.linear, first.fit, self.points[i])]
 
     def _propose(self, fit: SetFit) -> int:
-        """Index of a pair, with sizes as proposed if it was not flown yet."""
+        """Index of a set, with sizes as proposed if it was not flown yet."""
         names = tuple(sorted(fit.effects))
         known = {h.effects: i for i, h in enumerate(self.found) if h.unknown is None}
         if names in known:
@@ -240,7 +250,8 @@ class _Search:
                 remainder = self.bent[i].left if i in self.bent else remainder
                 left = remainder.reduced()
                 left = given(left, *self._room(i, known, left), SHARES[k - 1])
-                fits = split(known.fit, self._fit_unknown(left), self.nothing, self.linear.raw)[1]
+                fits = fit_unknown_left(left, self.flying.candidates)
+                fits = split(known.fit, fits, self.nothing, self.linear.raw)[1]
         fits = [u for u in fits if not self._named(u, known)]
         if not fits:
             return own, []
@@ -254,12 +265,6 @@ class _Search:
         return own, [Hypothesis(known.fit, best, float(prior),
                                 known.log_evidence + gained + more,
                                 Form((0.0,), (best.left,), self._free(known.fit, remainder, best)))]
-
-    def _fit_unknown(self, left: FloatArray) -> list[UnknownFit]:
-        """Generic terms on what a flown set leaves; their weights in rows of the bank."""
-        bank = self.flying.candidates
-        return [replace(u, weights={bank.terms[row - 1].row: w for row, w in u.weights.items()})
-                for u in fit_unknown(left, replace(bank, terms=_moved(bank.terms)))]
 
     def _named(self, unknown: UnknownFit, beside: Hypothesis) -> bool:
         """Whether generic terms are another form of a single effect of the library; beside others, the like of it."""
@@ -293,8 +298,3 @@ class _Search:
         told = [h for k, h in enumerate(told) if k in flown or h.unknown is not None or h.log_posterior <= bound]
         settled = self.bent[ranked[0]].point if ranked[0] in self.bent else self.points[ranked[0]]
         return replace(self.linear, hypotheses=normalised(told, 0.0), bare=bare, settled=settled.nuisances)
-
-
-def _moved(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """The terms with their rows in what a flown set leaves, itself being row 0."""
-    return tuple(replace(term, row=1 + j) for j, term in enumerate(terms))

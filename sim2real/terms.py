@@ -246,3 +246,8 @@ def _scales(flight: Reconstruction) -> dict[str, FloatArray]:
     p, qs = flight.parameters[0], _pressed_area(flight)
     return {"u": qs / p["mass"], "v": qs / p["mass"], "w": qs / p["mass"], "p": qs * p["span"] / p["inertia_xx"],
             "q": qs * p["chord"] / p["inertia_yy"], "r": qs * p["span"] / p["inertia_zz"]}  # fmt: skip
+
+
+def in_what_is_left(terms: Sequence[Term]) -> tuple[Term, ...]:
+    """The terms with their rows in what a flown set leaves, itself being row 0."""
+    return tuple(replace(term, row=1 + j) for j, term in enumerate(terms))
