@@ -229,11 +229,15 @@ def _cosine(one: dict[int, float], other: dict[int, float], raw: FloatArray) -> 
 
 
 def is_own(fit: SetFit, unknown: UnknownFit, nothing: float, raw: FloatArray) -> bool:
-    """Whether what generic terms take beside a set is another form of its effects, by place and by size or shape."""
-    taken = fit.misfit - unknown.misfit
-    most = max(shares(len(fit.families))) ** 2 * max(nothing - fit.misfit, 0.0)
-    return at_home(unknown.component, fit.effects) and (taken <= most or alike(fit, unknown, raw) > SHAPE
-                                                        or _bent(fit, unknown))
+    """Whether what generic terms take beside a set is another form of its effects, by place and by size or shape.
+
+    What these records do not show by itself has no other form that they show.
+    """
+    taken, explained = fit.misfit - unknown.misfit, nothing - fit.misfit
+    most = max(shares(len(fit.families))) ** 2 * explained
+    if explained <= LEAST**2 or not at_home(unknown.component, fit.effects):
+        return False
+    return taken <= most or alike(fit, unknown, raw) > SHAPE or _bent(fit, unknown)
 
 
 def _bent(fit: SetFit, unknown: UnknownFit) -> bool:

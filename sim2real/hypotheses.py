@@ -11,7 +11,7 @@ from scipy.special import logsumexp, softmax
 
 from icing_env import effects
 from icing_env.record import FloatArray
-from sim2real.form import MOSTLY, OTHER_FORM, SHAPE, SHARES, Form, alike, at_home, forgiven
+from sim2real.form import LEAST, MOSTLY, OTHER_FORM, SHAPE, SHARES, Form, alike, at_home, forgiven
 from sim2real.generic import UnknownFit
 from sim2real.paths import PATHS
 from sim2real.sets import SetFit
@@ -164,7 +164,7 @@ def is_home(h: Hypothesis, unknown: UnknownFit, told: float, explained: float, r
     """
     if len(h.effects) != 1 or h.unknown is not None or not at_home(unknown.component, h.effects):
         return False
-    return told > 0.0 and (explained > MOSTLY * told or alike(h.fit, unknown, raw) > SHAPE)
+    return told > 0.0 and explained > LEAST**2 and (explained > MOSTLY * told or alike(h.fit, unknown, raw) > SHAPE)
 
 
 def forgive(found: Sequence[Hypothesis], nothing: float, least: float, bare: float = 0.0,

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from icing_env import effects, scenario
 from icing_env.aircraft import load
 from sim2real.candidates import Family, bank, nodes
+from sim2real.companions import without
 from sim2real.courses import Course, Courses
 from sim2real.evidence import gather
 from sim2real.points import Flying
@@ -133,3 +134,11 @@ def test_a_row_that_flies_to_no_numbers_is_the_farthest_from_any_record(flying):
     assert np.max(left[:, 1][measured]) == LOST and np.isnan(left[:, 1][~measured]).all()
     point = flying.point(NOTHING, np.zeros(0), np.zeros(len(NUMBERS)))
     assert np.isfinite(point.cost)
+
+
+def test_a_set_without_a_member_is_the_rest_of_it_as_it_was():
+    both = a_set(tail_ice=0.1, roll_trim=0.002)
+    for m, (name, size) in enumerate([("roll_trim", 0.002), ("tail_ice", 0.1)]):
+        rest = without(both, m)
+        assert rest.effects == (name,) and rest.estimate == (size,) and rest.low95 == (size,)
+        assert rest.covariance == pytest.approx(np.array([[1e-4]]))
