@@ -139,7 +139,7 @@ def record(values: dict, seed: int):
     return fly(chosen, seed=seed, observer=False, protection=False).record
 
 
-# Pitching moment, as no effect has it, about the trimmed angle: about 0.08 most of it is a trim moment, and is called so.
+# Pitching moment, as no effect has it, about the trimmed angle: about 0.08 rad most of it is trim, and is called so.
 BENT = {"Cm_alpha_elevator": 8.0, "Cm_alpha_alpha": 3.0, "at_alpha": 0.05}
 
 
