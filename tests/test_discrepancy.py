@@ -140,7 +140,7 @@ def record(values: dict, seed: int):
 
 
 # Pitching moment, as no effect has it, about the trimmed angle: about 0.08 rad most of it is trim, and is called so.
-BENT = {"Cm_alpha_elevator": 8.0, "Cm_alpha_alpha": 3.0, "at_alpha": 0.05}
+BENT = {"Cm_alpha_elevator": 16.0, "Cm_alpha_alpha": 6.0, "at_alpha": 0.055}
 
 
 @pytest.fixture(scope="module")
@@ -153,7 +153,7 @@ def test_an_unknown_is_described_by_the_terms_it_has(unknown):
     assert unknown.unknown["component"] == "pitching_moment"
     assert unknown.unknown["kind"] == "static"
     found = {t["term"]: t for t in unknown.unknown["terms"]}
-    for term, size in (("alpha*elevator", 8.0), ("alpha*alpha", 3.0)):
+    for term, size in (("alpha*elevator", 16.0), ("alpha*alpha", 6.0)):
         assert abs(found[term]["coefficient"] - size) < 3.0 * found[term]["std_error"] < size
     assert "time" not in found and "airspeed" not in found  # what is not there does not earn a place
 
