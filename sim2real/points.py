@@ -24,6 +24,7 @@ from sim2real.sets import SetFit
 from sim2real.side_by_side import each
 from sim2real.steps import (
     FARTHEST,
+    SIZE_STEP,
     Place,
     Point,
     Slopes,
@@ -229,7 +230,7 @@ class Flying:
         gram[first - n : first, 0] += precision @ point.nuisances
         gram[0, first - n : first] = gram[first - n : first, 0]
         gram[0, 0] += point.nuisances @ precision @ point.nuisances
-        gram[1 : 1 + k, 1 : 1 + k] += 1e-2 * np.eye(k)
+        gram[1 : 1 + k, 1 : 1 + k] += (0.1 * SIZE_STEP) ** 2 * np.eye(k)  # sizes move by ten uncertainties
         return Remainder(gram, first, kept, left_in, (*ends(fit, point), *(int(j) for j in 1 + k + point.held)))
 
     def beside(self, fit: SetFit, point: Point, home: Collection[str]) -> list[FloatArray]:

@@ -54,7 +54,7 @@ def screen(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior:
     if len(close) > 1:
         for names in sorted(close, key=lambda names: points[names].cost)[:MOST]:
             points[names] = flying.settled(known[names].fit, points[names])
-    return {names: replace(point.without_held(), rows=(), slopes=()) for names, point in points.items()}
+    return {names: replace(point, rows=(), slopes=()) for names, point in points.items()}
 
 
 def _promising(posterior: Posterior, points: Points) -> list[tuple[str, ...]]:

@@ -11,11 +11,15 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from icing_env.record import FloatArray
+from sim2real.candidates import NUISANCE_STEP
 from sim2real.sets import SetFit
 
 ROUNDS, PATIENCE = 10, 2  # steps with the same slopes by nuisances, and those of them that need not help
 SETTLED = 0.2  # gain of half the whitened square that is worth another step
 FARTHEST = 5.0  # standard deviations of a nuisance: what is beyond is no nuisance but a gap
+# Step of a size for its slope, in standard deviations, as nuisances' are. Where a size and a nuisance change the same
+# number, slopes over longer steps bend apart and would tell the two from each other.
+SIZE_STEP = NUISANCE_STEP
 
 Place = tuple[FloatArray, FloatArray]  # sizes [k] and nuisances [n]
 
@@ -148,11 +152,11 @@ def promised(point: Point, step: FloatArray) -> float:
 
 
 def size_steps(fit: SetFit, sizes: FloatArray) -> FloatArray:
-    """Step of each size for its slope: about its uncertainty, inwards."""
+    """Step of each size for its slope: a part of its uncertainty, inwards."""
     out = np.zeros(len(sizes))
     for m, (family, size) in enumerate(zip(fit.families, sizes, strict=True)):
         low, high = family.parameter.low, family.parameter.high
         spread = 0.0 if fit.covariance is None else float(np.sqrt(fit.covariance[m, m]))
-        step = min(max(spread, 1e-3 * (high - low)), 0.1 * (high - low))
+        step = min(max(SIZE_STEP * spread, 1e-4 * (high - low)), 0.1 * (high - low))
         out[m] = step if size + step <= high else -step
     return out

@@ -73,6 +73,21 @@ def test_it_settles_where_full_steps_of_gauss_and_newton_do(flying):
     assert settled.cost < best.cost + 0.2
 
 
+def test_a_derivative_and_its_own_uncertainty_cannot_be_told_apart_where_they_are_flown(flying):
+    """N(1 + change)(1 + 0.05 z) has parallel slopes by both: else the size would look surer than it can be."""
+    family = next(f for f in bank().families if f.effect.name == "directional_stability")
+    change, spread = np.array([-0.2]), 0.04
+    fit = SetFit((family,), 0.0, (-0.2,), (-0.3,), (-0.1,), np.array([[spread**2]]), {}, 1e6)
+    point = flying.point(fit, change, np.zeros(len(flying.candidates.nuisances)))
+    j = next(j for j, n in enumerate(flying.candidates.nuisances) if n.parameter == "Cn_beta")
+    by_size, by_deviation = point.rows[0][:, 1] / point.steps[0], point.slopes[0].rows[:, j]
+    unlike = 0.05 * (1.0 - 0.2) * by_size - by_deviation
+    assert np.linalg.norm(by_deviation) > 1.0
+    assert np.linalg.norm(unlike) < 3e-3 * np.linalg.norm(by_deviation)
+    unit = family.parameter.high - family.parameter.low
+    assert unit * np.sqrt(np.linalg.inv(point.information)[0, 0]) > 0.04  # no surer than the spread lets it be
+
+
 @pytest.mark.parametrize(("slope", "misfit"), [(50.0, 200.0), (0.0, 200.0), (-5.0, 197.5)])
 def test_no_set_is_credited_with_what_lies_beyond_its_range(slope, misfit):
     """A size at the lower end: what falls on towards less is not to be had, what falls on towards more is."""
