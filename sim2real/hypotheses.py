@@ -205,9 +205,10 @@ def within(name: str, others: Sequence[str]) -> bool:
     """Whether an effect enters at one device alone (an actuator, an engine, an instrument) where another one does.
 
     Two faults of one device at once are rarer than one of another form; along an axis of the air's forces they are not.
+    The load is such a device: one that is not as stated changes mass, its centre and inertia together.
     """
     places = effects.LIBRARY[name].enters_at
-    device = len(places) == 1 and (places[0].startswith("sensor:") or places[0] in PATHS)
+    device = len(places) == 1 and (places[0].startswith("sensor:") or places[0] in (*PATHS, "mass"))
     return device and any(places[0] in effects.LIBRARY[other].enters_at for other in others)
 
 

@@ -108,7 +108,8 @@ def test_what_terms_take_of_noise_is_luck():
 def test_a_guest_is_a_fault_of_its_host_s_device():
     assert within("elevator_gearing", ["elevator_lag"]) and within("thrust_loss", ["asymmetric_thrust"])
     assert not within("asymmetric_thrust", ["thrust_loss"]) and not within("elevator_gearing", ["aileron_lag"])
-    assert not within("rudder_power", ["fin_ice"]) and not within("inertia_error", ["lateral_cg"])
+    assert within("inertia_error", ["lateral_cg"]) and not within("lateral_cg", ["inertia_error"])
+    assert not within("rudder_power", ["fin_ice"]) and not within("inertia_error", ["pitch_trim"])
     assert set_prior(("elevator_gearing", "elevator_lag"), 50) < set_prior(("elevator_gearing", "aileron_lag"), 50)
 
 
