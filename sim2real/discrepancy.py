@@ -26,9 +26,9 @@ from sim2real.hypotheses import Hypothesis, Posterior
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.sets import SetFit
+from sim2real.settling import nearer
 from sim2real.singles import DETECTABLE
 from sim2real.terms import DEVIATION, FROM_ZERO, GENERIC, GENERIC_SIZE, unit_of
-from sim2real.weigh import nearer
 
 SHOWN = DETECTABLE  # standard errors that a term has to stand out
 ROUNDS = 3  # of fitting: each flies the aircraft described so far

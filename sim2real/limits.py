@@ -17,9 +17,9 @@ from icing_env.record import FloatArray
 from sim2real.candidates import NUISANCE_STEP, Bank, parameter_rows
 from sim2real.evidence import Evidence, compare
 from sim2real.references import Baseline
+from sim2real.settling import nearer
 from sim2real.side_by_side import each
 from sim2real.singles import DETECTABLE, EffectFit
-from sim2real.weigh import nearer
 
 ROUNDS = 5  # times that all are flown
 MOST = 3.0  # times by which a size is changed at once

@@ -25,8 +25,9 @@ from sim2real.manoeuvre import MANOEUVRES, Manoeuvre, asked, flown
 from sim2real.paths import driven, follow, full_power
 from sim2real.predictor import TANGENT
 from sim2real.reconstruct import Reconstruction
+from sim2real.settling import nearer
 from sim2real.surfaces import EXACT
-from sim2real.weigh import Progress, nearer
+from sim2real.weigh import Progress
 
 STEP, SLOW = 0.02, ("altitude", "thrust_left", "thrust_right")  # s between samples; channels sampled every fifth
 UPSET = {"beta": 0.35, "phi": 1.2, "theta": 0.8}  # rad, beyond which nobody plans to fly (assumed)

@@ -20,6 +20,7 @@ from sim2real.candidates import NUISANCE_STEP, Bank, Nuisance
 from sim2real.evidence import Evidence, gather
 from sim2real.kalman import Gain
 from sim2real.reconstruct import Reconstruction
+from sim2real.tempering import temper
 
 ROUNDS, SETTLED = 10, 4.0  # flown steps, and the whitened length of one that ends them
 AGAIN = 2  # the round after which gust intensities are chosen anew at every step: what does not fit passes for gusts
@@ -116,9 +117,7 @@ def _possible(row: NDArray) -> NDArray:
 
 
 def _normal(evidences: Sequence[Evidence], at: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Information and slope of values and changes together [2 n], and what to divide them by (see weigh.temper)."""
-    from sim2real.weigh import temper  # which needs this module for Baseline
-
+    """Information and slope of values and changes together [2 n], and what to divide them by (see tempering.temper)."""
     n = len(evidences[0].gram) - 1
     information, slope, misfit = np.zeros((2 * n, 2 * n)), np.zeros(2 * n), 0.0
     for evidence, condition in zip(evidences, at, strict=True):
