@@ -51,7 +51,7 @@ def _moved(form: Form, now: Hypothesis, then: Hypothesis) -> Form:
         left[k] = form.left[k] + one.left[k] - other.left[k]
     more = form.left[0] - other.left[0]
     free, bent = ([replace(at, beyond=at.beyond + more) for at in places] for places in (one.free, one.bent))
-    return Form(tuple(gained), tuple(left), tuple(free), bent=tuple(bent), beside=form.beside)
+    return Form(tuple(gained), tuple(left), tuple(free), bent=tuple(bent), own=form.own)
 
 
 def corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior) -> Hypothesis:

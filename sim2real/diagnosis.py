@@ -16,9 +16,10 @@ from icing_env.jit import source_hash
 from icing_env.record import DataProblem, FlightRecord
 from sim2real import gap
 from sim2real.candidates import SPREAD, Bank, bank, not_testable
-from sim2real.discrepancy import describe_unknown, described
+from sim2real.discrepancy import Description, describe_unknown, described, in_other_form
 from sim2real.evidence import Evidence
-from sim2real.hypotheses import P_NONE, P_UNKNOWN, Posterior
+from sim2real.form import at_home
+from sim2real.hypotheses import P_NONE, P_UNKNOWN, Hypothesis, Posterior
 from sim2real.ladder import ladder
 from sim2real.limits import limits
 from sim2real.manoeuvre import next_manoeuvre
@@ -114,7 +115,11 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     if described_by is not None:
         progress("describing what the library lacks")
         unknown = describe_unknown(flights, candidates, evidences, baseline, posterior.tempering, described_by)
-    change = remedy(explained, unknown)
+    form = None
+    if explained is not None and (own := in_other_form(explained)) is not None:
+        progress("describing the form of what was found")
+        form = describe_unknown(flights, candidates, evidences, baseline, posterior.tempering, own)
+    change = remedy(explained, form or (unknown if explained and explained.unknown else None))
     progress("flying what these records could have revealed")
     shown = limits(evidences, candidates, baseline, posterior.tempering, posterior.fits)
     progress("flying the records freely, before and after")
@@ -133,7 +138,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         credible_set_95=credible([h["probability"] for h in hypotheses]),
         where={"channels": gap.by_channel(training.before), "components": components(posterior, enters_at),
                "regimes": regimes(evidences)},
-        effects=[describe(name, posterior) for name, p in ranked(posterior) if p >= LISTED],
+        effects=[describe(name, posterior, explained, form) for name, p in ranked(posterior) if p >= LISTED],
         not_testable=[{"effect": name, "why": why} for name, why in sorted(untestable.items())],
         detection_limits=detection_limits(posterior.fits, shown),
         unknown=None if unknown is None else unknown.answer(),
@@ -180,8 +185,13 @@ def credible(probabilities: Sequence[float], level: float = 0.95) -> list[int]:
     return list(range(min(count, len(probabilities))))
 
 
-def describe(name: str, posterior: Posterior) -> dict[str, Any]:
-    """One effect's entry: its size as in the most probable set that holds it."""
+def describe(name: str, posterior: Posterior, explained: Hypothesis | None = None,
+             form: Description | None = None) -> dict[str, Any]:
+    """One effect's entry: its size as in the most probable set that holds it.
+
+    Args:
+        explained, form: the explanation that the verdict rests on, and terms by which it is not the library's.
+    """
     fit = posterior.leading(name)
     at = fit.effects.index(name)
     effect, parameter = fit.families[at].effect, fit.families[at].parameter
@@ -191,7 +201,9 @@ def describe(name: str, posterior: Posterior) -> dict[str, Any]:
                              "unit": parameter.unit}
     return {"name": name, "probability": posterior.effects[name], "enters_at": list(effect.enters_at),
             "scope": "shared", "history": None, "parameters": shown,
-            "indistinguishable_from": list(posterior.classes[name])}
+            "indistinguishable_from": list(posterior.classes[name]),
+            "other_form": form.answer() if form and explained and name in explained.effects
+                          and at_home(form.component, (name,)) else None}  # fmt: skip
 
 
 def detection_limits(fits: Mapping[str, EffectFit], shown: Mapping[str, float | None]) -> dict[str, dict[str, Any]]:

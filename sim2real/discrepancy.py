@@ -23,6 +23,7 @@ from sim2real.candidates import Bank, Nuisance, shifted
 from sim2real.channels import SURFACES, TOLERANCE
 from sim2real.evidence import Evidence, compare
 from sim2real.hypotheses import Hypothesis, Posterior
+from sim2real.other_form import WORTH
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.sets import SetFit
@@ -124,6 +125,12 @@ def described(posterior: Posterior) -> Hypothesis | None:
     if posterior.unknown < 0.05:
         return None
     return next((h for h in posterior.hypotheses if h.unknown is not None), None)
+
+
+def in_other_form(explained: Hypothesis) -> Hypothesis | None:
+    """Known effects with generic terms at home as what is to be described, where these say much that they do not."""
+    own = None if explained.form is None or explained.unknown is not None else explained.form.own
+    return None if own is None or own.log_evidence < WORTH else replace(explained, unknown=own)
 
 
 def describe_unknown(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence],

@@ -66,8 +66,8 @@ class Form:
 
     gained: log evidence that they add, prior included; left: whitened square after them, luck taken out; free: at the
     home of each member, then of all; weights: of the terms where they were flown, by row of the bank; bent: `free` of
-    the ways in which terms were flown, if they were: all but none, and `beside`, whether the last way is generic terms
-    beside the set.
+    the ways in which terms were flown, if they were: all but none, and `own`, the generic terms beside the set that are
+    the last way, if there are any.
     """
 
     gained: tuple[float, ...]
@@ -75,7 +75,7 @@ class Form:
     free: tuple[Liberty, ...] = (Liberty(),)
     weights: dict[int, float] = field(default_factory=dict)
     bent: tuple[Liberty, ...] = ()
-    beside: bool = False
+    own: UnknownFit | None = None
 
     @property
     def least(self) -> float:
@@ -94,7 +94,7 @@ class Form:
 
     def way(self, k: int, nothing: float, noise: float, bare: float) -> float:
         """The same of one way, by how much the terms may take."""
-        flown = self.bent and 0 < k < len(self.gained) - self.beside
+        flown = self.bent and 0 < k < len(self.gained) - (self.own is not None)
         left, free = self.left[k], self.bent if flown else self.free
         found = [forgiven(left - noise, nothing - left, max(at.beyond - bare, 0.0), at.places, at.most) for at in free]
         return self.gained[k] + float(np.logaddexp.reduce(found) - np.log(len(found)))
@@ -258,4 +258,4 @@ def with_terms(form: Form | None, own: UnknownFit | None) -> Form | None:
     if own is None or form is None:
         return form
     gained = own.log_evidence - float(np.log(len(SHARES)))
-    return replace(form, gained=(*form.gained, gained), left=(*form.left, own.left), beside=True)
+    return replace(form, gained=(*form.gained, gained), left=(*form.left, own.left), own=own)

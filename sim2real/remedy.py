@@ -75,12 +75,12 @@ def remedy(explained: Hypothesis | None, description: Description | None) -> Rem
 
     Args:
         explained: of `leading`.
-        description: of its unknown, if it holds one.
+        description: of its unknown, if it holds one, or of its other form.
     """
     if explained is None:
         return Remedy()
     values, parts = values_of(explained.fit), [explained.fit.covariance]
-    if explained.unknown is not None and description is not None and description.values:
+    if description is not None and description.values:
         values["discrepancy"] = description.values
         parts.append(description.covariance)
     known = [p for p in parts if p is not None]

@@ -31,9 +31,11 @@ def _named(effect: dict[str, Any]) -> str:
     """An effect with its size, and what it may be taken for."""
     size = ", ".join(f"{k} {p['estimate']:.3g} {'' if p['unit'] == '1' else p['unit']}".rstrip()
                      for k, p in effect["parameters"].items() if p["low95"] != p["high95"])  # fmt: skip
-    told = effect["indistinguishable_from"]
+    told, form = effect["indistinguishable_from"], effect["other_form"]
     other = f", which these records cannot tell from {', '.join(told)}," if told else ""
-    return f"{effect['name']} ({size}){other}"
+    terms = ", ".join(t["term"] for t in form["terms"] if t["term"] != "1") if form else ""
+    bent = f" in another form than the library's ({form['component']} by {terms or 'a constant'})" if form else ""
+    return f"{effect['name']} ({size}){bent}{other}"
 
 
 def _closing(found: Diagnosis) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -69,16 +69,22 @@ def _explanations(report: Report, result: Mapping[str, Any]) -> None:
     rows: list[list[Any]] = []
     for effect in result["effects"]:
         for name, p in effect["parameters"].items():
-            rows.append([effect["name"], effect["probability"], f"{name} [{p['unit']}]", p["estimate"],
+            rows.append([effect["name"], f"{effect['probability']:.3f}", f"{name} [{p['unit']}]", p["estimate"],
                          f"{p['low95']:.4g} to {p['high95']:.4g}", _listed(effect["indistinguishable_from"])])
     if rows:
         report.table(["effect", "probability", "parameter", "estimate", "95 %", "cannot be told from"], rows,
                      "Effects that these records leave possible.")
     if result["unknown"]:
-        unknown = result["unknown"]
-        report.table(["term", "coefficient", "standard error"],
-                     [[t["term"], t["coefficient"], t["std_error"]] for t in unknown["terms"]],
-                     f"What the library lacks, as terms of {unknown['component']} ({unknown['kind']}).")
+        _terms(report, result["unknown"], "What the library lacks")
+    for effect in result["effects"]:
+        if effect["other_form"]:
+            _terms(report, effect["other_form"], f"What {effect['name']} is beside the library's form of it")
+
+
+def _terms(report: Report, described: Mapping[str, Any], what: str) -> None:
+    report.table(["term", "coefficient", "standard error"],
+                 [[t["term"], t["coefficient"], t["std_error"]] for t in described["terms"]],
+                 f"{what}, as terms of {described['component']} ({described['kind']}).")
 
 
 def _listed(names: list[str]) -> str | None:
@@ -95,8 +101,9 @@ def _where(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:
                   "Free simulation of the diagnosed records in 10 s windows, before and after.")
     if result["where"]["components"]:
         report.table(["component", "probability that the gap enters there"],
-                     [[c, p] for c, p in result["where"]["components"].items()], "Where the gap enters.")
-    report.figure(_heat(training), "Residual by channel and window, in tolerances, before the diagnosis.")
+                     [[c, f"{p:.3f}"] for c, p in result["where"]["components"].items()], "Where the gap enters.")
+    report.figure(_heat(training, [len(cut(f).first) for f in found.details.flights]),
+                  "Residual by channel and window, in tolerances, before the diagnosis.")
     if flown := stretches(found.details.evidences):
         report.figure(_regime_heat(flown),
                       "One-step predictions by channel and flight regime (quarters of each variable, low to high): "
@@ -200,14 +207,19 @@ def _rungs(ladder: Mapping[str, Any]) -> Figure:
 
 
 @styled
-def _heat(energy: gap.Energy) -> Figure:
+def _heat(energy: gap.Energy, windows: Sequence[int]) -> Figure:
+    """Channels by windows; `windows` of each record, one after another."""
     shown = [j for j in range(len(COMPARED)) if np.isfinite(energy.before[:, j]).any()]
     values = np.sqrt(energy.before[:, shown].T)
     figure = Figure(figsize=(9.2, 1.0 + 0.3 * len(shown)), layout="constrained")
     axes = figure.subplots()
     image = axes.imshow(values, aspect="auto", cmap="viridis", vmin=0.0)
     axes.set_yticks(range(len(shown)), [scale_of(COMPARED[j]).label for j in shown])
-    axes.set_xlabel("window (10 s each)")
+    edges = np.cumsum([0, *windows]) - 0.5
+    for edge in edges[1:-1]:
+        axes.axvline(edge, color="white", linewidth=2.0)
+    axes.set_xticks(0.5 * (edges[1:] + edges[:-1]), [f"record {k}" for k in range(1, len(edges))])
+    axes.set_xlabel("windows of 10 s, one record after another")
     axes.grid(False)
     figure.colorbar(image, ax=axes, label="tolerances")
     return figure

@@ -173,6 +173,23 @@ def test_the_command_flies_the_aircraft_that_was_diagnosed(unknown):
     assert len(unknown.resimulate["parameter_covariance"]) == len(unknown.unknown["terms"])
 
 
+# The same moment about another angle is mostly trim: the effect of that name, in another form than the library's.
+MOSTLY_TRIM = {"Cm_alpha_elevator": 8.0, "Cm_alpha_alpha": 3.0, "at_alpha": 0.08}
+
+
+def test_the_form_of_a_known_effect_is_flown_with_it():
+    found = diagnose([record(MOSTLY_TRIM, 3)], [record(MOSTLY_TRIM, 13)])
+    assert found.verdict == "explained" and found.unknown is None
+    assert found.hypotheses[0]["effects"] == ["pitch_trim"]
+    form = next(e for e in found.effects if e["name"] == "pitch_trim")["other_form"]
+    terms = {t["term"]: t for t in form["terms"]}
+    assert form["component"] == "pitching_moment"
+    for term, size in (("alpha*elevator", 8.0), ("alpha*alpha", 3.0)):
+        assert abs(terms[term]["coefficient"] - size) < 3.0 * terms[term]["std_error"] < size
+    assert set(found.details.change.values) == {"pitch_trim", "discrepancy"}
+    assert found.gap["held_out"]["closure"] > 0.7  # -0.2 without the terms
+
+
 # Delays are left out: what the search differences are one-step predictions, whose steps are those of the filter too.
 FLOWN = {(component, name) for component, _, names in GENERIC for name in names}
 PUSHED = [t for t in bank().terms if (t.component, t.name) in FLOWN and t.component != "sensor:altitude"
