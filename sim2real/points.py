@@ -24,6 +24,7 @@ from sim2real.sets import SetFit
 from sim2real.side_by_side import each
 from sim2real.steps import (
     FARTHEST,
+    ROUNDED,
     SIZE_STEP,
     Place,
     Point,
@@ -198,6 +199,7 @@ class Flying:
         slope[k:] += prior @ nuisances
         information[k:, k:] += prior
         information[:k, :k] += np.eye(k)  # a size moves no farther than its range
+        information += ROUNDED * np.diag(np.diag(information))  # where a flight departs, as much is lost to rounding
         cost = 0.5 * (gram[0, 0] + nuisances @ prior @ nuisances)
         return Point(sizes, nuisances, float(cost), slope, information, steps)
 

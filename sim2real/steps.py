@@ -20,6 +20,7 @@ FARTHEST = 5.0  # standard deviations of a nuisance: what is beyond is no nuisan
 # Step of a size for its slope, in standard deviations, as nuisances' are. Where a size and a nuisance change the same
 # number, slopes over longer steps bend apart and would tell the two from each other.
 SIZE_STEP = NUISANCE_STEP
+ROUNDED = 1e-12  # of the information of each, that rounding may take
 
 Place = tuple[FloatArray, FloatArray]  # sizes [k] and nuisances [n]
 
@@ -110,12 +111,18 @@ def rooms(fit: SetFit, point: Point, unit: FloatArray) -> tuple[FloatArray, Floa
 
 
 def bounded_step(information: FloatArray, slope: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """The step between `low` and `high` that lowers half the whitened square most, taken as a quadratic."""
-    step = -np.linalg.solve(information, slope)
+    """The step between `low` and `high` that lowers half the whitened square most, taken as a quadratic.
+
+    In units in which the information of each is one: where a flight departs, a size may tell 1e9 times as much as the
+    prior of a nuisance.
+    """
+    unit = 1.0 / np.sqrt(np.diag(information))
+    scaled, along = information * unit[:, None] * unit, slope * unit
+    step = -np.linalg.solve(scaled, along) * unit
     if np.all((low <= step) & (step <= high)):
         return np.asarray(step)
-    root = np.linalg.cholesky(information)
-    return np.asarray(lsq_linear(root.T, -np.linalg.solve(root, slope), (low - 1e-12, high + 1e-12), method="bvls").x)
+    root, ends = np.linalg.cholesky(scaled), (low / unit - 1e-12, high / unit + 1e-12)
+    return np.asarray(lsq_linear(root.T, -np.linalg.solve(root, along), ends, method="bvls").x * unit)
 
 
 def step_from(fit: SetFit, point: Point) -> FloatArray:

@@ -7,6 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from icing_env import scenario
 from icing_env.aircraft import load
@@ -100,3 +102,18 @@ def test_no_set_is_credited_with_what_lies_beyond_its_range(slope, misfit):
     assert found.fit.misfit == pytest.approx(misfit, abs=2.0)  # a step of its grid
     assert found.log_evidence < 0.5 * (300.0 - misfit)
     assert found.fit.low95[0] >= end[0]
+
+
+@given(st.integers(0, 10_000), st.floats(0.0, 10.0))
+def test_a_step_is_found_however_much_more_a_size_tells_than_a_nuisance(seed, decades):
+    """Units of some parameters change by up to 1e10: the step is as good, within the same bounds."""
+    rng = np.random.default_rng(seed)
+    rows = rng.standard_normal((40, 6))
+    information, slope = rows.T @ rows, rng.standard_normal(6) * 10.0
+    high = rng.uniform(0.01, 1.0, 6)
+    unit = 10.0 ** (decades * rng.uniform(0.0, 1.0, 6))
+    plain = bounded_step(information, slope, -high, high)
+    other = bounded_step(information * unit[:, None] * unit, slope * unit, -high / unit, high / unit)
+    cost = [float(step @ slope + 0.5 * step @ information @ step) for step in (plain, other * unit)]
+    assert np.all(np.abs(plain) <= high + 1e-9) and np.all(np.abs(other * unit) <= high + 1e-9)
+    assert cost[1] == pytest.approx(cost[0], rel=1e-6) and cost[0] < 0.0
