@@ -14,6 +14,8 @@ from sim2real.sets import Modes, SetFit, integrate
 from sim2real.sizes import in_powers
 from sim2real.steps import Point, bounded_step, ranges, rooms
 
+DEPARTED = 100.0  # times the log likelihood that nothing at all loses, and some, beyond which a set does not fly
+
 
 def inherited(found: Sequence[Hypothesis], before: Sequence[Hypothesis], bases: Iterable[int],
               points: Iterable[int]) -> list[Hypothesis]:
@@ -55,8 +57,14 @@ def _moved(form: Form, now: Hypothesis, then: Hypothesis) -> Form:
 
 
 def corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior) -> Hypothesis:
-    """Evidence and sizes of a set from where it settled: its likelihood is taken as Gaussian there."""
+    """Evidence and sizes of a set from where it settled: its likelihood is taken as Gaussian there.
+
+    Where it does not fly at all, its slopes say nothing, and it is as bad as it was flown.
+    """
     none = 0.5 * float(posterior.reduced[0, 0])
+    if lost(point, posterior):
+        return replace(hypothesis, log_evidence=none - point.cost, form=None, instead=None,
+                       fit=replace(hypothesis.fit, misfit=2.0 * point.cost))  # fmt: skip
     k = len(point.sizes)
     across, others = point.information[:k, k:], point.information[k:, k:]
     onto: FloatArray = np.asarray(np.linalg.solve(others, np.column_stack([point.slope[k:], across.T])), np.float64)
@@ -67,6 +75,11 @@ def corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior) -> Hyp
     fit = _integrated(hypothesis.fit, point, cost, slope, information)
     log = fit.log_evidence + none
     return replace(hypothesis, log_evidence=log, fit=replace(fit, log_evidence=log))
+
+
+def lost(point: Point, posterior: Posterior) -> bool:
+    """Whether a set departs from flight where it settled: nothing at all is far nearer to the records."""
+    return point.cost > DEPARTED * (0.5 * float(posterior.reduced[0, 0]) + 1e4)
 
 
 def _integrated(fit: SetFit, point: Point, cost: float, slope: FloatArray, information: FloatArray) -> SetFit:

@@ -17,7 +17,7 @@ from scipy.special import logsumexp
 from icing_env.record import FloatArray
 from sim2real.any_course import beside, with_courses
 from sim2real.companions import companions, leading, together, without
-from sim2real.corrections import corrected, inherited
+from sim2real.corrections import corrected, inherited, lost
 from sim2real.courses import Remainder
 from sim2real.form import (
     FORGIVEN,
@@ -130,17 +130,18 @@ class _Search:
     def _fly(self, i: int) -> None:
         h = self.found[i]
         self.points[i] = self.flying.settle(h.fit, self.beginning[i] if i in self.beginning else self.start(h))
-        h = corrected(h, self.points[i], self.linear)
+        self.found[i] = h = corrected(h, self.points[i], self.linear)
+        if lost(self.points[i], self.linear):
+            return
         self.left[i] = self.flying.left_over(h.fit, self.points[i])
         left = self.left[i].reduced()
         places = home(h.effects) if h.effects else {u.component for u in self.linear.courses if u.log_evidence > 0.0}
         fits = fit_unknown_left(left, self.flying.candidates)
         self.generic[i] = with_courses(fits, beside(self.flying.courses, self.left[i], places))
         if h.effects:
-            h = replace(h, form=self._form(i, h, left), instead=None)
+            self.found[i] = replace(h, form=self._form(i, h, left), instead=None)
         else:
             self.nothing = h.fit.misfit
-        self.found[i] = h
 
     def _form(self, i: int, h: Hypothesis, left: FloatArray) -> Form:
         """Another form of a flown set, itself flown where it takes much."""
@@ -200,12 +201,11 @@ class _Search:
 
     def _bare(self) -> float:
         """The same where the best of them may do whatever it likes at home."""
-        flown = [self.found[i] for i in self.points]
-        return min(h.fit.misfit if h.form is None else h.form.bare() for h in flown)
+        return min(h.fit.misfit if h.form is None else h.form.bare() for h in map(self.found.__getitem__, self.points))
 
     def _ranked(self, effects: int | None = None) -> list[int]:
-        """Flown hypotheses, the best first; those of so many effects alone if given."""
-        chosen = [i for i in self.points if effects in (None, len(self.found[i].effects))]
+        """Hypotheses that fly, the best first; those of so many effects alone if given."""
+        chosen = [i for i in self.left if effects in (None, len(self.found[i].effects))]
         return sorted(chosen, key=lambda i: -self.found[i].log_posterior)
 
     def companions(self) -> list[int]:

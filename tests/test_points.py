@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from icing_env import scenario
 from icing_env.aircraft import load
 from sim2real.candidates import bank
-from sim2real.corrections import corrected
+from sim2real.corrections import corrected, lost
 from sim2real.courses import Course, Courses
 from sim2real.evidence import gather
 from sim2real.hypotheses import Hypothesis
@@ -117,3 +117,16 @@ def test_a_step_is_found_however_much_more_a_size_tells_than_a_nuisance(seed, de
     cost = [float(step @ slope + 0.5 * step @ information @ step) for step in (plain, other * unit)]
     assert np.all(np.abs(plain) <= high + 1e-9) and np.all(np.abs(other * unit) <= high + 1e-9)
     assert cost[1] == pytest.approx(cost[0], rel=1e-6) and cost[0] < 0.0
+
+
+def test_a_set_that_does_not_fly_is_as_bad_as_it_was_flown():
+    """Slopes of a flight that departs say nothing; believed, they made a negative square of rounding, or a crash."""
+    family = next(f for f in bank().families if f.effect.name == "lift_slope")
+    fit = SetFit((family,), 0.0, (0.5,), (0.4,), (0.6,), np.array([[1e-2]]), {}, 0.0)
+    slope, information = np.array([-1e13, 0.0, 0.0]), np.diag([1e22, 1e16, 1.0])
+    far = Point(np.array([0.5]), np.zeros(2), 6.7e13, slope, information, np.ones(1))
+    posterior = SimpleNamespace(reduced=np.array([[3e5]]))
+    assert lost(far, posterior) and not lost(replace(far, cost=3e5), posterior)
+    found = corrected(Hypothesis(fit, None, 0.0, 0.0), far, posterior)
+    assert found.fit.misfit == 2.0 * far.cost and found.log_evidence == 1.5e5 - far.cost
+    assert found.fit.estimate == fit.estimate
