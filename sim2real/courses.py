@@ -15,6 +15,7 @@ import numpy as np
 
 from icing_env.record import FloatArray
 from sim2real.evidence import Evidence
+from sim2real.means import without_means
 from sim2real.paths import PATHS
 from sim2real.predictor import Push
 from sim2real.side_by_side import each
@@ -93,7 +94,7 @@ class Course:
             own = at_any_time(self.about.flight, component, len(hats))
             columns[component] = slice(len(hats), len(hats) + len(own))
             hats += own
-        values = self.about.respond(self.pushes(hats)).values
+        values = without_means(self.about.respond(self.pushes(hats)).values, self.evidence.flight, self.about.first)
         return {component: values[:, at] for component, at in columns.items()}
 
     def inner(self, one: str, other: str) -> FloatArray:

@@ -103,6 +103,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     if reference:
         progress("fitting the model to the reference flights")
         baseline = fit_baseline(_reconstructed(reference, None, simulator), candidates)
+        candidates = replace(candidates, clean=baseline.clean)
     flights = _reconstructed(records, baseline, simulator)
     others = _reconstructed(held_out, baseline, simulator)
     untestable = not_testable(flights, candidates)
@@ -158,12 +159,14 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
 def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, simulator: Rollout | None
                    ) -> list[Reconstruction]:  # fmt: skip
     """Records over the model that references corrected, or over a simulator of the user's so corrected."""
-    flights = [reconstruct(record, None if baseline is None else baseline.near(record)) for record in records]
+    flights = [reconstruct(record) for record in records] if baseline is None else [
+        replace(reconstruct(record, baseline.near(record)), inadequacy=baseline.inadequacy) for record in records]
     flights = in_common([placed(flight) for flight in in_step(flights)])
     if simulator is None:
         return flights
-    return [replace(flight, known=flying_as(reconstruct(record), simulator).known)
-            for flight, record in zip(flights, records, strict=True)]
+    yours = [flying_as(reconstruct(record), simulator) for record in records]
+    return [replace(f, known=y.known, inadequacy=f.inadequacy.with_walk(y.inadequacy.walk))
+            for f, y in zip(flights, yours, strict=True)]
 
 
 def ranked(posterior: Posterior) -> list[tuple[str, float]]:

@@ -19,6 +19,7 @@ from icing_env.record import FloatArray
 from sim2real.candidates import Bank, parameter_rows
 from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR
 from sim2real.kalman import Gain, follow, gains
+from sim2real.means import Means
 from sim2real.paths import counted, path_gram, path_residuals
 from sim2real.predictor import Push, held, innovations, predicted, with_spare
 from sim2real.reconstruct import Reconstruction
@@ -43,7 +44,7 @@ class Evidence:
             signature v_j - v of candidate j.
         gain: the predictor's, with the gust intensity that the record was whitened with.
         factor: whitens innovations [steps, channels, channels].
-        samples: whitened numbers behind the inner products.
+        samples: whitened numbers behind the inner products, those of coloured channels in part.
         whitened: [N, channels of MEASURED], v itself, for showing where the gap lies.
         rows: [N x channels, kept] what is behind `gram` but for the paths, of the rows that were kept.
         linear: the predictor linearised along the model's flight, where the candidates were flown.
@@ -52,7 +53,7 @@ class Evidence:
     gram: FloatArray
     gain: Gain
     factor: FloatArray
-    samples: int
+    samples: float
     whitened: FloatArray
     flight: Reconstruction
     rows: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
@@ -102,9 +103,10 @@ def flown(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain:
     renamed = tuple(replace(q, row=index[q.row]) for q in pushed)
     left = with_spare(flight, rows[moved], gain.K, renamed)
     first = round(SETTLE / flight.dt)
-    inner, samples = np.zeros((len(index), len(index))), 0
+    inner, samples = np.zeros((len(index), len(index))), 0.0
     whitened = np.zeros((len(left), len(MEASURED)))
     kept = np.zeros(((len(left) - first) * len(MEASURED), len(keep)))
+    means = Means(flight, first)
     at = np.array([(i, index[row]) for i, row in enumerate(keep) if row in index], np.intp).reshape(-1, 2)
     for k in range(first, len(left), CHUNK):
         flat = np.empty((len(left[k : k + CHUNK]) * len(MEASURED), len(index)))
@@ -112,9 +114,14 @@ def flown(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain:
         if linear.rows:
             flat[:, len(moved) :] = linear.values[(k - first) * len(MEASURED) :][: len(flat)]
         whitened[k : k + CHUNK] = flat[:, 0].reshape(-1, len(MEASURED))
-        samples += int(np.count_nonzero(flat[:, 0]))
+        samples += float(np.sum((whitened[k : k + CHUNK] != 0.0) / worth_less(flight)))
+        means.take(flat, k - first)
         kept[(k - first) * len(MEASURED) :][: len(flat), at[:, 0]] = flat[:, at[:, 1]]
         inner += flat.T @ flat
+    if means.told:
+        inner -= means.energy()
+        kept[:, at[:, 0]] -= means.over_time(at[:, 1].tolist())
+        whitened[first:] -= means.over_time([0]).reshape(-1, len(MEASURED))
     gram = np.zeros((len(rows), len(rows)))
     gram[np.ix_([*index], [*index])] = inner
     return Evidence(gram, gain, factor, samples, whitened, flight, kept)
@@ -137,6 +144,15 @@ def choose_gain(flight: Reconstruction, options: list[Gain], pushed: Sequence[Pu
         options: in the order of their intensities.
         pushed: generic discrepancies that the model is flown with, whatever their rows.
     """
+    scores = likelihoods(flight, options, pushed)
+    k = int(np.argmax(scores))
+    if k in (0, len(options) - 1):
+        return options[k]
+    return gains(flight, (_peak([g.sigma for g in options[k - 1 : k + 2]], scores[k - 1 : k + 2]),))[0]
+
+
+def likelihoods(flight: Reconstruction, options: Sequence[Gain], pushed: Sequence[Push] = ()) -> list[float]:
+    """Log likelihood of a sample's innovations with each of some gains, their size taken from medians."""
     everywhere = tuple(replace(push, row=i) for push in pushed for i in range(len(options)))
     left = innovations(flight, np.repeat(flight.parameters, len(options)), np.stack([g.K for g in options]), everywhere)
     left = left[round(SETTLE / flight.dt) :]
@@ -147,11 +163,8 @@ def choose_gain(flight: Reconstruction, options: list[Gain], pushed: Sequence[Pu
         factor = np.linalg.cholesky(gain.S[np.ix_(use, use)])
         white = np.linalg.solve(factor, z.T)
         away = np.median(np.abs(white - np.median(white, axis=1, keepdims=True)), axis=1)
-        scores.append(-0.5 * np.sum((1.4826 * away) ** 2) - np.sum(np.log(np.diag(factor))))
-    k = int(np.argmax(scores))
-    if k in (0, len(options) - 1):
-        return options[k]
-    return gains(flight, (_peak([g.sigma for g in options[k - 1 : k + 2]], scores[k - 1 : k + 2]),))[0]
+        scores.append(-0.5 * float(np.sum((1.4826 * away) ** 2)) - float(np.sum(np.log(np.diag(factor)))))
+    return scores
 
 
 def _peak(sigmas: Sequence[float], scores: Sequence[float]) -> float:
@@ -178,7 +191,12 @@ def whitening(left: FloatArray, gain: Gain, flight: Reconstruction) -> FloatArra
     white = whiten(left[:, None], out)[settled, 0]
     for c in use:
         out[:, c] /= max(_spread(white[:, c]), 0.3)
-    return out
+    return out / np.sqrt(worth_less(flight))[:, None]
+
+
+def worth_less(flight: Reconstruction) -> FloatArray:
+    """What every channel's innovations are worth less because they are coloured where there is no gap [channels]."""
+    return np.array([flight.inadequacy.colour.get(name, 1.0) for name in MEASURED])
 
 
 def whiten(left: FloatArray, factor: FloatArray) -> FloatArray:

@@ -96,7 +96,8 @@ def fit_unknown(reduced: FloatArray, bank: Bank) -> list[UnknownFit]:
         mean, error = variance @ t[kept], np.sqrt(np.diag(variance))
         found = tuple((terms[i].name, float(m), float(e)) for i, m, e in zip(kept, mean, error, strict=True))
         together = float(np.logaddexp.reduce([log for log, _, _ in ways])) - np.log(len(ways))
-        out.append(UnknownFit(component, together - _by_timing(terms, T, t), found,
+        needless = _by_timing(terms, T, t) + bank.clean.get(component, 0.0)
+        out.append(UnknownFit(component, together - needless, found,
                               float(reduced[0, 0] - mean @ t[kept]),
                               {rows[i]: float(m) for i, m in zip(kept, mean, strict=True)}))
     return out

@@ -25,7 +25,6 @@ from sim2real.reconstruct import Reconstruction
 # knows are white, means over 100 samples and over whole records included (`tests/test_whiteness.py`).
 WALK = {"u": 3e-3, "v": 3e-3, "w": 3e-3, "p": 3e-5, "q": 3e-5, "r": 3e-5, "altitude": 5e-3, "phi": 4e-5, "theta": 4e-5}
 WALK_OF_GUST = {"q": 2.5e-4, "phi": 5e-5, "theta": 5e-5}
-SECOND_HAND = 10.0  # times as much where accelerations of another simulator are taken at noisy states (assumed)
 TRANSIENT = 10.0  # s with gains of their own after the start
 SPAN = 1.0  # s along a record that are flown as if at one condition
 ROUGH = 60  # steps after which a gust no longer shows in third differences
@@ -135,8 +134,8 @@ def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, 
         Qw: covariance of what drives the gusts.
         noise: variance of every fed-back channel's own noise.
     """
-    looser = 1.0 if flight.known is None else SECOND_HAND
-    walk = np.array([np.hypot(looser * WALK.get(n, 1e-6), WALK_OF_GUST.get(n, 0.0) * sigma) for n in TANGENT])
+    worse = flight.inadequacy.walk
+    walk = np.array([np.hypot(worse * WALK.get(n, 1e-6), WALK_OF_GUST.get(n, 0.0) * sigma) for n in TANGENT])
     blank = np.array([not flight.has(name) for name in MEASURED[:FED_BACK]])
     rate = np.array([max(np.mean(np.isfinite(flight.measured[:, j])), 1e-3) for j in range(FED_BACK)])
     least = np.array([NOISE_FLOOR[name] for name in MEASURED[:FED_BACK]])

@@ -68,7 +68,7 @@ def next_manoeuvre(flight: Reconstruction, bank: Bank, rivals: Mapping[str, Mapp
     for manoeuvre in MANOEUVRES if pairs else ():
         try:
             apart = distances(fly(flight, manoeuvre), bank, [(n, rivals[n]) for n in names], sigma)
-        except InputError:  # this aircraft cannot be trimmed there
+        except InputError:  # this aircraft cannot be trimmed or stay there
             continue
         score = sum(weights[a] * weights[b] * min(apart[a, b], TARGET) ** 2 for a, b in pairs)
         parted = [[a, b] for a, b in pairs if apart[a, b] >= INDISTINGUISHABLE]
@@ -81,9 +81,12 @@ def fly(flight: Reconstruction, manoeuvre: Manoeuvre) -> Reconstruction:
     """The manoeuvre flown by the model, as a record without noise in the channels that `flight` has.
 
     Raises:
-        InputError: the aircraft cannot fly steadily at that speed.
+        InputError: the aircraft cannot fly steadily at that speed, or departs from flight.
     """
-    return flown(*asked(flight, manoeuvre))
+    made = flown(*asked(flight, manoeuvre))
+    if not np.isfinite(made.measured[-1, :FED_BACK][[made.has(name) for name in MEASURED[:FED_BACK]]]).all():
+        raise InputError(f"{manoeuvre.name}: the model departs from flight")
+    return made
 
 
 def asked(flight: Reconstruction, manoeuvre: Manoeuvre) -> tuple[Reconstruction, dict[str, float]]:

@@ -27,6 +27,25 @@ LONGITUDINAL = ("airspeed", "alpha", "q", "theta", "ax", "az", "elevator")
 
 
 @dataclass(frozen=True)
+class Inadequacy:
+    """What the model is known to lack, with its numbers at their best: noise to the filter.
+
+    Attributes:
+        walk: times as much as `kalman.WALK` that the states are disturbed.
+        colour: what slow innovations of a channel are worth less, its long-run variance once whitened, where above one.
+        means: how many times less a channel's mean over the flight is worth than that.
+    """
+
+    walk: float = 1.0
+    colour: dict[str, float] = field(default_factory=dict)
+    means: dict[str, float] = field(default_factory=dict)
+
+    def with_walk(self, least: float) -> Inadequacy:
+        """The same with at least so much disturbance."""
+        return replace(self, walk=max(self.walk, least))
+
+
+@dataclass(frozen=True)
 class Reconstruction:
     """One record on the simulation's steps; N samples.
 
@@ -48,6 +67,7 @@ class Reconstruction:
         surface_noise: standard deviation of the SURFACES in `controls` [3], rad, sample by sample.
         about: the condition, by quantity, that generic terms count deviations from; the record's medians if left out.
         reach: root mean square of the generic terms' time courses, by name, where above one.
+        inadequacy: of the model.
     """
 
     name: str
@@ -67,6 +87,7 @@ class Reconstruction:
     surface_noise: FloatArray = field(default_factory=lambda: np.full(len(SURFACES), SURFACE_NOISE))
     about: dict[str, float] = field(default_factory=dict)
     reach: dict[str, float] = field(default_factory=dict)
+    inadequacy: Inadequacy = Inadequacy()
 
     def channel(self, name: str) -> FloatArray:
         """One column of `measured`, gaps filled by interpolation; zeros where it was not recorded."""

@@ -18,8 +18,8 @@ from icing_env import aircraft
 from icing_env.record import FlightRecord, FloatArray
 from sim2real.candidates import NUISANCE_STEP, Bank, Nuisance
 from sim2real.evidence import Evidence, gather
-from sim2real.kalman import Gain
-from sim2real.reconstruct import Reconstruction
+from sim2real.inadequacy import WALKS, clean, colour, walk
+from sim2real.reconstruct import Inadequacy, Reconstruction
 from sim2real.tempering import temper
 
 ROUNDS, SETTLED = 10, 4.0  # flown steps, and the whitened length of one that ends them
@@ -42,12 +42,15 @@ LEAST = 1e-3  # of a published step: a number near zero has a nuisance that hard
 class Baseline:
     """The model a gap is looked for against: its PARAMETERS row and the precision of its nuisances [n, n].
 
-    `changes`: what is added to PARAMETERS per unit of (65 m/s / V)^2 - 1, by name.
+    `changes`: what is added to PARAMETERS per unit of (65 m/s / V)^2 - 1, by name; `inadequacy`: what is
+    left then; `clean`: what generic terms explain of the references all the same, log evidence by component.
     """
 
     parameters: NDArray
     precision: FloatArray
     changes: dict[str, float] = field(default_factory=dict)
+    inadequacy: Inadequacy = field(default_factory=Inadequacy)
+    clean: dict[str, float] = field(default_factory=dict)
 
     def near(self, record: FlightRecord) -> NDArray:
         """PARAMETERS row at the record's median airspeed."""
@@ -79,34 +82,64 @@ def directions(candidates: Bank) -> tuple[Nuisance, ...]:
 
 def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank) -> Baseline:
     """The model corrected by reference flights, and the precision with which they leave it."""
-    moves = directions(candidates)
-    fitted = replace(candidates, nuisances=moves, families=(), terms=(), size=1 + len(moves))
-    at = np.array([_condition(float(np.median(f.channel("airspeed")))) for f in flights])
-    x, gains, n = np.zeros(2 * len(moves)), None, len(moves)
-    spread = np.concatenate([np.ones(n), np.full(n, CHANGES)])
+    fit = _Fit(flights, directions(candidates))
     for k in range(ROUNDS):
-        evidences = _gather(flights, fitted, x, at, gains)
-        gains = None if k >= AGAIN else [e.gain for e in evidences]
-        information, slope, tempering = _normal(evidences, at)
-        prior = np.diag(1.0 / np.maximum(spread, np.abs(x)) ** 2)
-        precision = information / tempering + prior
-        step = -np.linalg.solve(precision, slope / tempering + prior @ x)
-        x = x + step * min(1.0, LONGEST / max(float(np.max(np.abs(step))), LONGEST))
-        if k > AGAIN + 1 and float(step @ precision @ step) < SETTLED**2:
-            break
-    return _baseline(candidates, moves, x, precision, float(np.mean(at)))
+        settled = fit.step(again=k > AGAIN) < SETTLED
+        if k == AGAIN or (k > AGAIN and settled):
+            last, fit.walk = fit.walk, walk(fit.flown())
+            if k > AGAIN and fit.walk == last:
+                break
+    return fit.baseline(candidates)
 
 
-def _gather(flights: Sequence[Reconstruction], fitted: Bank, x: FloatArray, at: FloatArray,
-            gains: Sequence[Gain] | None) -> list[Evidence]:
-    n = len(fitted.nuisances)
-    out = []
-    for i, flight in enumerate(flights):
-        row = flight.parameters.copy()
-        for nuisance, size in zip(fitted.nuisances, x[:n] + at[i] * x[n:], strict=True):
-            nuisance.apply(row, 0, flight.power_from, float(size))
-        out.append(gather(replace(flight, parameters=_possible(row)), fitted, None if gains is None else gains[i]))
-    return out
+class _Fit:
+    """Values and changes of the numbers `moves`, fitted to `flights`.
+
+    x: the numbers' values, then their changes [2 n], in `moves`' units; walk: of `Inadequacy`.
+    """
+
+    def __init__(self, flights: Sequence[Reconstruction], moves: Sequence[Nuisance]) -> None:
+        n = len(moves)
+        self.flights, self.moves = flights, moves
+        self.at = np.array([_condition(float(np.median(f.channel("airspeed")))) for f in flights])
+        self.bank = Bank(tuple(moves), (), (), 1 + n)
+        self.x, self.spread = np.zeros(2 * n), np.concatenate([np.ones(n), np.full(n, CHANGES)])
+        self.walk = WALKS[-1]  # while the model may still be far off
+        self.precision = np.zeros((0, 0))
+        self.evidences: list[Evidence] = []
+
+    def flown(self) -> list[Reconstruction]:
+        """The flights over the model as fitted so far."""
+        n, out = len(self.moves), []
+        for flight, condition in zip(self.flights, self.at, strict=True):
+            row = flight.parameters.copy()
+            for nuisance, size in zip(self.moves, self.x[:n] + condition * self.x[n:], strict=True):
+                nuisance.apply(row, 0, flight.power_from, float(size))
+            out.append(replace(flight, parameters=_possible(row), inadequacy=Inadequacy(self.walk)))
+        return out
+
+    def step(self, again: bool) -> float:
+        """One step of x; its whitened length.
+
+        Args:
+            again: whether gust intensities are chosen anew.
+        """
+        gains = [None] * len(self.flights) if again or not self.evidences else [e.gain for e in self.evidences]
+        self.evidences = [gather(f, self.bank, gain) for f, gain in zip(self.flown(), gains, strict=True)]
+        information, slope, tempering = _normal(self.evidences, self.at)
+        prior = np.diag(1.0 / np.maximum(self.spread, np.abs(self.x)) ** 2)
+        self.precision = information / tempering + prior
+        step = -np.linalg.solve(self.precision, slope / tempering + prior @ self.x)
+        self.x = self.x + step * min(1.0, LONGEST / max(float(np.max(np.abs(step))), LONGEST))
+        return float(np.sqrt(step @ self.precision @ step))
+
+    def baseline(self, candidates: Bank) -> Baseline:
+        """What was fitted, and how well it flies."""
+        found = _baseline(candidates, self.moves, self.x, self.precision, float(np.mean(self.at)))
+        left = Inadequacy(self.walk, *colour(self.evidences))
+        flown = [replace(flight, inadequacy=left) for flight in self.flown()]
+        told = clean(flown, [e.gain for e in self.evidences], candidates, found.precision)
+        return replace(found, inadequacy=left, clean=told)
 
 
 def _possible(row: NDArray) -> NDArray:

@@ -36,12 +36,13 @@ from icing_env.record import FlightRecord, FloatArray
 from icing_env.sensors import SENSOR_PARAMETERS
 from sim2real.channels import TOLERANCE
 from sim2real.predictor import Predictor, put
-from sim2real.reconstruct import LONGITUDINAL, Reconstruction, reconstruct
+from sim2real.reconstruct import LONGITUDINAL, Inadequacy, Reconstruction, reconstruct
 from sim2real.windows import COMPARED, FREE, cut
 
 BEGIN = 0.5  # s of the record that the start of a window is taken from
 SMOOTH = 0.3  # s of the measured states from which both simulators are started at every sample
 WARM, RUN = 0.3, 1.0  # s after which your simulator remembers what it would in flight; s flown at a time
+SECOND_HAND = 10.0  # times as much that states are disturbed, for accelerations taken at noisy ones (assumed)
 _FELT = ("ax", "ay", "az", "p", "q", "r")
 _FORCES, _RATES = ([COMPARED.index(c) for c in names] for names in (_FELT[:3], _FELT[3:]))
 _RATES_FREE, _STATE, _ALPHA = [FREE.index(c) for c in _FELT[3:]], [COMPARED.index(c) for c in FREE], FREE.index("alpha")
@@ -130,7 +131,7 @@ def flying_as(flight: Reconstruction, rollout: Rollout) -> Reconstruction:
     if lacking:
         raise InputError(f"your simulator reads no {', '.join(lacking)}: a diagnosis needs ax, az and q")
     known[:, absent] = 0.0
-    return replace(flight, known=known)
+    return replace(flight, known=known, inadequacy=Inadequacy(SECOND_HAND))
 
 
 def _accelerations(readings: FloatArray, start: FloatArray, dt: float) -> FloatArray:

@@ -1,0 +1,110 @@
+"""What reference flights show of the model that flies them: nothing where it knows the aircraft."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from icing_env.aircraft import load
+from icing_env.record import read
+from sim2real.candidates import bank
+from sim2real.channels import MEASURED
+from sim2real.diagnosis import _reconstructed, diagnose
+from sim2real.evidence import SETTLE, gather
+from sim2real.generic import fit_unknown
+from sim2real.inadequacy import BATCHES, colour
+from sim2real.means import without_means
+from sim2real.reconstruct import Inadequacy
+from sim2real.references import Baseline, fit_baseline
+from testbed.withheld.draw import published_spread
+from testbed.withheld.files import record_text, side_text
+from testbed.withheld.flights import Aircraft, recorded
+from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
+
+CANDIDATES = bank()
+Q, AX = MEASURED.index("q"), MEASURED.index("ax")
+FLIGHTS, N = 5, 1800
+
+
+def flown(folder, role: str, factors: dict[str, float], seed: int) -> list:
+    """Records of three manoeuvres in still air by the generator's plant."""
+    out = []
+    for i, manoeuvre in enumerate(PLANS[2][:DIAGNOSED]):
+        flight, seen = recorded(Aircraft(factors), manoeuvre, 1.15, (0.0, 1.0, 1.0), np.random.default_rng([seed, i]))
+        (folder / f"{role}{i}.csv").write_text(record_text(seen, flight.commands))
+        (folder / f"{role}{i}.toml").write_text(side_text("x", role))
+        out.append(read(folder / f"{role}{i}.csv"))
+    return out
+
+
+def innovations(seed: int) -> list[SimpleNamespace]:
+    rng = np.random.default_rng(seed)
+    return [SimpleNamespace(whitened=rng.normal(size=(N, len(MEASURED)))) for _ in range(FLIGHTS)]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_white_innovations_have_no_colour(seed):
+    within, means = colour(innovations(seed))
+    assert len(within) + len(means) <= 1  # by chance
+
+
+def test_slow_innovations_are_worth_their_long_run_variance_less():
+    """An autoregression of first order r and unit innovations has that of 1 / (1 - r)^2."""
+    white, r = innovations(1), 0.8
+    for flight in white:
+        for k in range(1, N):
+            flight.whitened[k, Q] += r * flight.whitened[k - 1, Q]
+    within, means = colour(white)
+    assert set(within) == {"q"} and "q" not in means
+    assert within["q"] == pytest.approx(25.0, rel=0.4)  # the largest of len(BATCHES) ratios: rather more than less
+    assert len(BATCHES) > 1
+
+
+def test_a_mean_that_differs_between_flights_leaves_the_changes_their_worth():
+    white = innovations(2)
+    for flight, offset in zip(white, (-1.0, 1.0, -1.0, 1.0, 0.0), strict=True):
+        flight.whitened[:, AX] += offset
+    within, means = colour(white)
+    assert "ax" not in within
+    assert means["ax"] == pytest.approx(0.8 * N, rel=0.1)
+
+
+def test_rows_and_inner_products_lose_the_same_mean(tmp_path):
+    plain = _reconstructed(flown(tmp_path, "diagnose", {}, 1)[:1], Baseline(load(), np.eye(1)), None)[0]
+    known = gather(plain, CANDIDATES)
+    flight = replace(plain, inadequacy=Inadequacy(1.0, {"q": 4.0}, {"q": 9.0, "altitude": 4.0}))
+    less = gather(flight, CANDIDATES, known.gain)
+    first = round(SETTLE / flight.dt)
+    own = less.whitened[first:].reshape(-1)
+    found = less.rows[:, : len(CANDIDATES.nuisances)].T @ own
+    assert found == pytest.approx(less.gram[1 : 1 + len(found), 0], rel=1e-9, abs=1e-6)
+    assert np.mean(less.whitened[first:, Q]) == pytest.approx(np.mean(known.whitened[first:, Q]) / (2.0 * 3.0))
+    rows = np.random.default_rng(0).normal(size=(len(own), 2))
+    away = without_means(rows, flight, first) - rows
+    assert np.ptp(away.reshape(-1, len(MEASURED), 2)[:, Q], axis=0) == pytest.approx(0.0, abs=1e-12)
+    assert not np.any(away.reshape(-1, len(MEASURED), 2)[:, AX])
+    assert less.samples < known.samples
+
+
+def test_what_terms_explain_of_clean_flights_is_no_evidence():
+    rng = np.random.default_rng(3)
+    one = tuple(term for term in CANDIDATES.terms if term.component == "z_force")
+    terms = tuple(replace(term, row=1 + i) for i, term in enumerate(one))
+    half = rng.normal(size=(1 + len(terms), 200))
+    found, = fit_unknown(half @ half.T, replace(CANDIDATES, terms=terms))
+    clean, = fit_unknown(half @ half.T, replace(CANDIDATES, terms=terms, clean={"z_force": 7.0}))
+    assert found.log_evidence - clean.log_evidence == pytest.approx(7.0)
+    assert clean.misfit == found.misfit
+
+
+def test_an_aircraft_that_the_model_knows_is_disturbed_little_and_has_no_gap(tmp_path):
+    """References of an aircraft whose derivatives are off by their published spread, of the other plant."""
+    factors = published_spread(np.random.default_rng(5))
+    clean, again = (flown(tmp_path, role, factors, seed) for role, seed in (("reference", 1), ("diagnose", 2)))
+    found = fit_baseline(_reconstructed(clean, None, None), CANDIDATES)
+    assert found.inadequacy.walk <= 10.0
+    assert set(found.inadequacy.colour) <= {"airspeed", "ax", "altitude"} or max(found.inadequacy.colour.values()) < 4.0
+    assert diagnose(again, reference=clean).verdict == "no_gap"
