@@ -42,6 +42,8 @@ def companions(flying: Flying, linear: Posterior, first: SetFit, point: Point) -
             name = family.effect.name
             if name in linear.fits and name not in first.effects:
                 fit = fit_family(reduced, family)
+                if not np.isfinite(fit.log_evidence):  # beside this one, flights depart whatever its size
+                    continue
                 if name not in best or fit.log_evidence > best[name].log_evidence:
                     best[name] = fit
         promising = sorted(best.values(), key=lambda fit: -fit.log_evidence)[:COMPANIONS]

@@ -23,6 +23,7 @@ INTEGRATED = 40  # sets of one size whose evidence is integrated on a grid; the 
 POINTS = {1: 201, 2: 41, 3: 13}  # of that grid along each axis
 SPAN = 5.0  # standard deviations that it reaches
 SEEDS = 6  # pairs that triples are grown from
+ROUNDED = 1e-12  # of the information of each, that rounding may take
 Members = NDArray[np.intp]
 
 
@@ -160,6 +161,7 @@ def descend(problem: Powers, members: Members, start: FloatArray) -> Modes:
         x, cost = np.where(better[:, None], tried, x), np.where(better, new, cost)
         damping = np.where(better, np.minimum(2.0 * damping, 1.0), 0.3 * damping)
     information = _derivatives(block, x, d)[1] + ridge
+    information += ROUNDED * information * np.eye(members.shape[1])  # where flights depart, as much is lost to rounding
     return Modes(members, x, cost, information, _laplace(problem, members, x, cost, information))
 
 

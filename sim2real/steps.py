@@ -20,7 +20,7 @@ FARTHEST = 5.0  # standard deviations of a nuisance: what is beyond is no nuisan
 # Step of a size for its slope, in standard deviations, as nuisances' are. Where a size and a nuisance change the same
 # number, slopes over longer steps bend apart and would tell the two from each other.
 SIZE_STEP = NUISANCE_STEP
-ROUNDED = 1e-12  # of the information of each, that rounding may take
+DIFFERENCE = 1e-14  # of the square that is left, that rounding takes where slopes are differences of inner products
 
 Place = tuple[FloatArray, FloatArray]  # sizes [k] and nuisances [n]
 
