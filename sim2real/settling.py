@@ -13,6 +13,7 @@ from sim2real.attribution import nuisance_mean, reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, shifted
 from sim2real.evidence import SIGMAS, Evidence, choose_gain, gather, whitening
 from sim2real.hypotheses import Hypothesis
+from sim2real.inadequacy import WALKS
 from sim2real.kalman import Gain, follow, gains
 from sim2real.points import Flying
 from sim2real.predictor import Push, innovations, predicted
@@ -26,6 +27,7 @@ SETTLING, SETTLED = 6, 10.0  # steps towards the best nuisances, and the whitene
 NEAR = 2  # of SIGMAS to either side are tried
 TURNS = 4  # times at most that gusts are judged with an explanation, and that is brought to its best in them
 UNLIKE = 0.06  # log of the ratio of innovation variances beyond which another gain is worth a flight (assumed)
+DEPARTED = 1e6  # mean whitened square of a model that does not follow the record: an effect far off makes 1e4
 MOVED = 4.0  # standard deviations by which the model that variants are flown about is moved at most
 
 
@@ -50,6 +52,23 @@ def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseli
             break
         known = each(likeliest, about(flights, only, centre), known)
     return centre, known
+
+
+def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline
+             ) -> tuple[list[Reconstruction], FloatArray, list[Gain]]:  # fmt: skip
+    """The records, with the settled model's nuisances [n] and gains.
+
+    A model that is no longer corrected enough to keep to a record departs from it, and nothing can be told of what
+    departs. Its filter has to expect more noise, though some of a gap may pass for that.
+    """
+    model = replace(candidates, nuisances=(), families=(), terms=(), size=1)
+    for least in WALKS:
+        flights = [replace(f, inadequacy=f.inadequacy.with_walk(least)) for f in flights]
+        centre, known = settle(flights, candidates, baseline)
+        left = each(lambda flight, gain: gather(flight, model, gain), about(flights, candidates, centre), known)
+        if all(float(e.gram[0, 0]) < DEPARTED * e.samples for e in left):
+            break
+    return list(flights), centre, known
 
 
 def likeliest(flight: Reconstruction, last: Gain, pushed: Sequence[Push] = ()) -> Gain:

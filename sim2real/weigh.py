@@ -22,7 +22,7 @@ from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.refine import refine
 from sim2real.screen import Points, screen, screened
-from sim2real.settling import differ, gains_with, gather_about, length, nearer, settle
+from sim2real.settling import differ, followed, gains_with, gather_about, length, nearer
 from sim2real.steps import FARTHEST
 from sim2real.tempering import temper, total
 
@@ -44,7 +44,7 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
         untestable: effects left out, with the reason; those that these records do not show are added.
     """
     progress("fitting the model's own uncertainty")
-    centre, known = settle(flights, candidates, baseline)
+    flights, centre, known = followed(flights, candidates, baseline)
     found = _Weighing(flights, candidates, baseline, untestable, centre)
     progress(f"flying {candidates.size} variants along {len(flights)} records")
     found.gather(known)
