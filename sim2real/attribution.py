@@ -33,7 +33,7 @@ from sim2real.hypotheses import (
     normalised,
     set_prior,
 )
-from sim2real.sets import INTEGRATED, ROUNDED, SetFit, grow, integrate, pairs, sizes_tried
+from sim2real.sets import INTEGRATED, SetFit, firm, grow, integrate, pairs, sizes_tried
 from sim2real.singles import EffectFit, ambiguity, fit_family
 from sim2real.sizes import flown_weights, in_powers
 
@@ -47,9 +47,8 @@ def reduce(gram: FloatArray, bank: Bank, precision: FloatArray | None = None) ->
     """
     g = np.arange(1, 1 + len(bank.nuisances))
     inner = gram[np.ix_(g, g)] / NUISANCE_STEP**2 + (np.eye(len(g)) if precision is None else precision)
-    inner += ROUNDED * inner * np.eye(len(g))  # flights that depart alike are one and the same to rounding
     cross = gram[:, g] / NUISANCE_STEP
-    return np.asarray(gram - cross @ np.linalg.solve(inner, cross.T))
+    return np.asarray(gram - cross @ np.linalg.solve(firm(inner), cross.T))
 
 
 def nuisance_mean(gram: FloatArray, bank: Bank, weights: dict[int, float]) -> FloatArray:

@@ -106,7 +106,7 @@ def flown(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain:
     inner, samples = np.zeros((len(index), len(index))), 0.0
     whitened = np.zeros((len(left), len(MEASURED)))
     kept = np.zeros(((len(left) - first) * len(MEASURED), len(keep)))
-    means = Means(flight, first)
+    means, worth = Means(flight, first), 1.0 / worth_less(flight)
     at = np.array([(i, index[row]) for i, row in enumerate(keep) if row in index], np.intp).reshape(-1, 2)
     for k in range(first, len(left), CHUNK):
         flat = np.empty((len(left[k : k + CHUNK]) * len(MEASURED), len(index)))
@@ -114,7 +114,7 @@ def flown(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain:
         if linear.rows:
             flat[:, len(moved) :] = linear.values[(k - first) * len(MEASURED) :][: len(flat)]
         whitened[k : k + CHUNK] = flat[:, 0].reshape(-1, len(MEASURED))
-        samples += float(np.sum((whitened[k : k + CHUNK] != 0.0) / worth_less(flight)))
+        samples += float(np.sum((whitened[k : k + CHUNK] != 0.0) @ worth))
         means.take(flat, k - first)
         kept[(k - first) * len(MEASURED) :][: len(flat), at[:, 0]] = flat[:, at[:, 1]]
         inner += flat.T @ flat

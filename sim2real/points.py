@@ -20,7 +20,7 @@ from sim2real.evidence import SETTLE, Evidence, compare, flown
 from sim2real.paths import PATHS, excess, of_paths, path_gram
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
-from sim2real.sets import ROUNDED, SetFit
+from sim2real.sets import SetFit, firm
 from sim2real.side_by_side import each
 from sim2real.steps import (
     DIFFERENCE,
@@ -199,8 +199,7 @@ class Flying:
         slope[k:] += prior @ nuisances
         information[k:, k:] += prior
         information[:k, :k] += np.eye(k)  # a size moves no farther than its range
-        # Where a flight departs, as much is lost to rounding: of each, and of what differences are taken of.
-        information += np.diag(ROUNDED * np.abs(np.diag(information)) + DIFFERENCE * gram[0, 0] * unit[1:] ** 2)
+        information = firm(information) + np.diag(DIFFERENCE * gram[0, 0] * unit[1:] ** 2)
         cost = 0.5 * (gram[0, 0] + nuisances @ prior @ nuisances)
         return Point(sizes, nuisances, float(cost), slope, information, steps)
 

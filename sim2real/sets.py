@@ -160,9 +160,13 @@ def descend(problem: Powers, members: Members, start: FloatArray) -> Modes:
         better = new < cost
         x, cost = np.where(better[:, None], tried, x), np.where(better, new, cost)
         damping = np.where(better, np.minimum(2.0 * damping, 1.0), 0.3 * damping)
-    information = _derivatives(block, x, d)[1] + ridge
-    information += ROUNDED * information * np.eye(members.shape[1])  # where flights depart, as much is lost to rounding
+    information = firm(_derivatives(block, x, d)[1] + ridge)
     return Modes(members, x, cost, information, _laplace(problem, members, x, cost, information))
+
+
+def firm(information: FloatArray) -> FloatArray:
+    """Information [..., k, k] with what rounding may take of each: flights that depart alike are one and the same."""
+    return np.asarray(information + ROUNDED * information * np.eye(information.shape[-1]))
 
 
 def _weights(x: FloatArray, degree: int) -> FloatArray:
