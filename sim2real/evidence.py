@@ -21,7 +21,7 @@ from sim2real.channels import FED_BACK, MEASURED, NOISE_FLOOR
 from sim2real.kalman import Gain, follow, gains
 from sim2real.means import Means
 from sim2real.paths import counted, path_gram, path_residuals
-from sim2real.predictor import Push, held, innovations, predicted, with_spare
+from sim2real.predictor import LOST, Push, held, innovations, predicted, with_spare
 from sim2real.reconstruct import Reconstruction
 from sim2real.response import Filter, Responses
 from sim2real.terms import Term, pushes
@@ -152,7 +152,10 @@ def choose_gain(flight: Reconstruction, options: list[Gain], pushed: Sequence[Pu
 
 
 def likelihoods(flight: Reconstruction, options: Sequence[Gain], pushed: Sequence[Push] = ()) -> list[float]:
-    """Log likelihood of a sample's innovations with each of some gains, their size taken from medians."""
+    """Log likelihood of a sample's innovations with each of some gains, their size taken from medians.
+
+    That of a filter which loses the record is minus infinity: what is lost is constant, and medians would call it calm.
+    """
     everywhere = tuple(replace(push, row=i) for push in pushed for i in range(len(options)))
     left = innovations(flight, np.repeat(flight.parameters, len(options)), np.stack([g.K for g in options]), everywhere)
     left = left[round(SETTLE / flight.dt) :]
@@ -160,6 +163,9 @@ def likelihoods(flight: Reconstruction, options: Sequence[Gain], pushed: Sequenc
     for i, gain in enumerate(options):
         use = [c for c in range(FED_BACK - 1) if flight.has(MEASURED[c])]
         z = np.nan_to_num(left[:, i, use].astype(float))
+        if np.max(np.abs(z), initial=0.0) >= LOST:
+            scores.append(-np.inf)
+            continue
         factor = np.linalg.cholesky(gain.S[np.ix_(use, use)])
         white = np.linalg.solve(factor, z.T)
         away = np.median(np.abs(white - np.median(white, axis=1, keepdims=True)), axis=1)
@@ -169,6 +175,8 @@ def likelihoods(flight: Reconstruction, options: Sequence[Gain], pushed: Sequenc
 
 def _peak(sigmas: Sequence[float], scores: Sequence[float]) -> float:
     """Where a parabola in the logarithm through three scores, the middle one the best, is highest."""
+    if not np.all(np.isfinite(scores)):
+        return sigmas[1]
     at = np.log(sigmas)
     square, slope, _ = np.polyfit(at, scores, 2)
     return float(np.exp(np.clip(-0.5 * slope / square, at[0], at[2]))) if square < 0.0 else sigmas[1]

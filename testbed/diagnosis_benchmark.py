@@ -134,7 +134,8 @@ def closed(folder: Path) -> Iterator[None]:
 def solve(case: Path, without: tuple[str, ...] = ()) -> dict[str, Any]:
     """The diagnosis of one case's records, as `icing diagnose --json` prints it, some effects left out of the library.
 
-    A record that is refused is an answer too: {"error": why}, wrong in every figure and counted as failed.
+    A record that is refused, or that the solver fails on, is an answer too: {"error": why}, wrong in every figure and
+    counted as failed.
     """
     from icing_env.record import read
     from sim2real.diagnosis import diagnose
@@ -147,6 +148,8 @@ def solve(case: Path, without: tuple[str, ...] = ()) -> dict[str, Any]:
         found: dict[str, Any] = plain(answer(told))
     except InputError as error:
         return {"error": str(error)}
+    except Exception as error:  # one case that fails must not cost the others their answers
+        return {"error": f"{type(error).__name__}: {error}"}
     return found
 
 

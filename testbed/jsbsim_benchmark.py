@@ -83,7 +83,7 @@ def _solve(out: Path, names: list[str], workers: int, progress: Progress) -> Non
 
 
 def solve(case: Path) -> dict[str, Any]:
-    """The diagnosis of one case, as `icing diagnose --json` prints it; a refused record is {"error": why}."""
+    """The diagnosis of one case, as `icing diagnose --json` prints it; {"error": why} where there is none."""
     from icing_env.record import read
     from sim2real.diagnosis import diagnose
     from testbed.commands.common import plain
@@ -95,6 +95,8 @@ def solve(case: Path) -> dict[str, Any]:
         found: dict[str, Any] = plain(answer(diagnose(of["diagnose"], of["held_out"], of["reference"])))
     except InputError as error:
         return {"error": str(error)}
+    except Exception as error:  # one case that fails must not cost the others their answers
+        return {"error": f"{type(error).__name__}: {error}"}
     return found
 
 

@@ -6,6 +6,7 @@ Flown by the generator's plant, in gusts of another scale than the filter has, b
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from icing_env.aircraft import load
 from icing_env.record import read
 from sim2real.candidates import bank
 from sim2real.diagnosis import _reconstructed
-from sim2real.evidence import SIGMAS
+from sim2real.evidence import SIGMAS, choose_gain, likelihoods
 from sim2real.kalman import gains
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
@@ -63,3 +64,14 @@ def test_the_likeliest_gusts_are_found_from_wherever_they_were_sought_last(tmp_p
     flight = flown(tmp_path, 1)[0][0]
     first = gains(flight, (last,))[0]
     assert likeliest(flight, first).sigma == likeliest(flight, gains(flight, (1.45,))[0]).sigma
+
+
+def test_a_filter_that_loses_the_record_is_not_the_likeliest(tmp_path):
+    """Whatever is lost is a constant, whose median deviation is none at all."""
+    flight = flown(tmp_path, 1)[0][0]
+    good, wild = gains(flight, (1.2, 3.2))
+    wild = replace(wild, K=40.0 * wild.K)
+    scores = likelihoods(flight, [good, wild])
+    assert np.isfinite(scores[0]) and scores[1] == -np.inf
+    assert choose_gain(flight, [good, wild]).sigma == good.sigma
+    assert choose_gain(flight, [gains(flight, (0.8,))[0], good, wild]).sigma == good.sigma
