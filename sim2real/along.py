@@ -183,7 +183,8 @@ def along(table: Any, controls: Any, first: Any, measured: Any, stretch: Any, ga
         first: sample at which each row starts [n].
         measured: [N, channels of MEASURED], nan where nothing was measured.
         stretch: by which a fed-back channel's error is multiplied [FED_BACK].
-        gain: [1 or n, steps, FED_BACK, states then roll and pitch], the last step's goes on; empty for free flight.
+        gain: [1 or n, steps, FED_BACK, states then roll and pitch] of the record's steps, the last one's goes on; empty
+            for free flight.
         force_at, force: (row, state) of what is added to states [F, 2], and how much at each sample [F, N].
         error_at, error: (row, channel) of what is added to readings [E, 2], and how much at each sample [E, N].
         known: what every row is accelerated by at each sample beside its own forces, m/s2 and rad/s2 in the order of
@@ -225,10 +226,11 @@ def along(table: Any, controls: Any, first: Any, measured: Any, stretch: Any, ga
                     out[k, i, _FELT[c]] += known[first[i] + k + 1, c]
             for j in range(len(error)):
                 if at <= error_at[j, 0] < at + count:
-                    out[k, error_at[j, 0], error_at[j, 1]] += error[j, k + 1]
+                    out[k, error_at[j, 0], error_at[j, 1]] += error[j, first[error_at[j, 0]] + k + 1]
             for i in range(at, at + count if len(gain) > 0 else at):
-                own = gain[i if len(gain) > 1 else 0, min(k, gain.shape[1] - 1)]
-                correct(x[i], y[i, _PHI], out[k, i], measured[k + 1], stretch, own, fed, change)
+                at_sample = first[i] + k
+                own = gain[i if len(gain) > 1 else 0, min(at_sample, gain.shape[1] - 1)]
+                correct(x[i], y[i, _PHI], out[k, i], measured[at_sample + 1], stretch, own, fed, change)
             for j in range(len(force)):
                 if at <= force_at[j, 0] < at + count:
-                    x[force_at[j, 0], force_at[j, 1]] += force[j, k + 1]
+                    x[force_at[j, 0], force_at[j, 1]] += force[j, first[force_at[j, 0]] + k + 1]

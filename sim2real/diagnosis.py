@@ -19,6 +19,7 @@ from sim2real.candidates import SPREAD, Bank, bank, not_testable
 from sim2real.discrepancy import Description, describe_unknown, described, in_other_form
 from sim2real.evidence import Evidence
 from sim2real.form import at_home
+from sim2real.history import SAME, History, histories
 from sim2real.hypotheses import P_NONE, P_UNKNOWN, Hypothesis, Posterior
 from sim2real.ladder import ladder
 from sim2real.limits import limits
@@ -121,6 +122,10 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         progress("describing the form of what was found")
         form = describe_unknown(flights, candidates, evidences, baseline, posterior.tempering, own)
     change = remedy(explained, form or (unknown if explained and explained.unknown else None))
+    sizes = dict[str, History]()
+    if explained is not None and explained.effects:
+        progress("looking at how the sizes went along the records")
+        sizes = histories(flights, candidates, evidences, baseline, posterior, explained.fit, change)
     progress("flying what these records could have revealed")
     shown = limits(evidences, candidates, baseline, posterior.tempering, posterior.fits)
     progress("flying the records freely, before and after")
@@ -139,7 +144,8 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         credible_set_95=credible([h["probability"] for h in hypotheses]),
         where={"channels": gap.by_channel(training.before), "components": components(posterior, enters_at),
                "regimes": regimes(evidences)},
-        effects=[describe(name, posterior, explained, form) for name, p in ranked(posterior) if p >= LISTED],
+        effects=[describe(name, posterior, explained, form, sizes.get(name, SAME))
+                 for name, p in ranked(posterior) if p >= LISTED],
         not_testable=[{"effect": name, "why": why} for name, why in sorted(untestable.items())],
         detection_limits=detection_limits(posterior.fits, shown),
         unknown=None if unknown is None else unknown.answer(),
@@ -150,7 +156,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         resimulate=resimulation(change, training, flights, evidences),
         data_problems=[_problem(p) for f in (*flights, *others) for p in f.record.problems if not _slow(p, f.record)],
         provenance=provenance(flights, others, evidences, without, len(reference), seed)
-        | {"tempering": posterior.tempering},
+        | {"tempering": posterior.tempering, "model": baseline.answer() if reference else None},
         seconds=time.perf_counter() - began,
         details=Details(tuple(flights), tuple(others), tuple(evidences), posterior, change, training, tested),
     )
@@ -189,11 +195,12 @@ def credible(probabilities: Sequence[float], level: float = 0.95) -> list[int]:
 
 
 def describe(name: str, posterior: Posterior, explained: Hypothesis | None = None,
-             form: Description | None = None) -> dict[str, Any]:
+             form: Description | None = None, course: History = SAME) -> dict[str, Any]:
     """One effect's entry: its size as in the most probable set that holds it.
 
     Args:
         explained, form: the explanation that the verdict rests on, and terms by which it is not the library's.
+        course: how its size went along the records.
     """
     fit = posterior.leading(name)
     at = fit.effects.index(name)
@@ -203,8 +210,7 @@ def describe(name: str, posterior: Posterior, explained: Hypothesis | None = Non
     shown[parameter.name] = {"estimate": fit.estimate[at], "low95": fit.low95[at], "high95": fit.high95[at],
                              "unit": parameter.unit}
     return {"name": name, "probability": posterior.effects[name], "enters_at": list(effect.enters_at),
-            "scope": "shared", "history": None, "parameters": shown,
-            "indistinguishable_from": list(posterior.classes[name]),
+            "parameters": shown, "indistinguishable_from": list(posterior.classes[name]), **course.answer(),
             "other_form": form.answer() if form and explained and name in explained.effects
                           and at_home(form.component, (name,)) else None}  # fmt: skip
 

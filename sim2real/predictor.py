@@ -71,7 +71,8 @@ class Predictor:
         Args:
             steps: how many samples.
             first: the sample at which they start, one or one per row.
-            gain: K of a `Gain` [steps, states, fed-back channels], or one per row [n, ...]; free flight if omitted.
+            gain: K of a `Gain` [steps of the record, states, fed-back channels], or one per row [n, ...]; free flight
+                if omitted.
             pushes: generic discrepancies.
 
         Returns:

@@ -9,7 +9,8 @@ prior is that of the published model; where the flights contradict it a number's
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,10 @@ class Baseline:
             for name, slope in self.changes.items():
                 out[name] += condition * slope
         return out
+
+    def answer(self) -> dict[str, Any]:
+        """What references say of the model with its numbers at their best, for machines."""
+        return {**asdict(self.inadequacy), "explained_without_a_gap": {c: v for c, v in self.clean.items() if v > 0.0}}
 
 
 def _condition(airspeed: float) -> float:

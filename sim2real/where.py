@@ -16,7 +16,7 @@ from sim2real.evidence import Evidence
 from sim2real.hypotheses import Posterior
 from sim2real.reconstruct import Reconstruction
 
-REGIME_VARIABLES = ("alpha", "airspeed", "beta", "q", "p", "elevator", "aileron", "rudder", "power", "time")
+REGIME_VARIABLES = ("alpha", "airspeed", "beta", "q", "p", "elevator", "aileron", "rudder", "power", "ice", "time")
 BINS = 4
 FEWEST = 100  # samples that make a stretch
 # Above noise, of the whitened square: what clean flights of aircraft within the model's uncertainty may leave in a
@@ -103,9 +103,22 @@ def regimes(evidences: Sequence[Evidence]) -> list[dict[str, Any]]:
 
 
 def _variable(flight: Reconstruction, name: str) -> FloatArray:
-    """Of every sample [N]: a channel, a surface, both engines' power, or the time since the start."""
+    """Of every sample [N]: a channel, a surface, both engines' power, the water met, or the time since the start."""
     if name == "time":
         return flight.time - flight.time[0]
+    if name == "ice":
+        return _water_met(flight)
     if name == "power":
         return flight.controls["power_left"] + flight.controls["power_right"]
     return flight.controls[name] if name in flight.controls else flight.channel(name)
+
+
+def _water_met(flight: Reconstruction) -> FloatArray:
+    """Liquid water on the aircraft's way so far [N], kg/m2: what ice it may have; zeros where none was recorded."""
+    lwc = flight.record.channels.get("lwc", np.zeros(0))
+    known = np.isfinite(lwc)
+    if not known.any():
+        return np.zeros(len(flight.time))
+    since = flight.record.time[known] - flight.record.time[0]
+    rate = np.interp(flight.time, since, lwc[known]) * flight.channel("airspeed")
+    return np.concatenate([[0.0], np.cumsum(rate[:-1] * flight.dt)])

@@ -12,6 +12,21 @@ def sentences(found: Diagnosis) -> list[str]:
     return [_finding(found), _closing(found), _next(found)]
 
 
+def of_the_model(found: Diagnosis) -> str:
+    """What the reference flights said of the model with its numbers at their best; nothing without references."""
+    told = found.provenance["model"]
+    if told is None:
+        return ""
+    kept = (f"the {found.provenance['references']} reference flights are followed with {told['walk']:g} times the "
+            "process noise of an aircraft that the model knows")
+    slow = sorted(told["colour"].items(), key=lambda item: -item[1])[:3]
+    colour = [f"{channel} (by {ratio:.3g})" for channel, ratio in slow]
+    less = f"; slow errors count for less in {', '.join(colour)}" if colour else ""
+    home = list(told["explained_without_a_gap"])
+    terms = f"; part of what {', '.join(home)} would explain is there without a gap" if home else ""
+    return f"Corrected by its references, {kept}{less}{terms}."
+
+
 def _finding(found: Diagnosis) -> str:
     first = found.hypotheses[0]
     sure = f"probability {first['probability']:.2f}"
@@ -35,7 +50,17 @@ def _named(effect: dict[str, Any]) -> str:
     other = f", which these records cannot tell from {', '.join(told)}," if told else ""
     terms = ", ".join(t["term"] for t in form["terms"] if t["term"] != "1") if form else ""
     bent = f" in another form than the library's ({form['component']} by {terms or 'a constant'})" if form else ""
-    return f"{effect['name']} ({size}){bent}{other}"
+    return f"{effect['name']} ({size}{_varying(effect)}){bent}{other}"
+
+
+def _varying(effect: dict[str, Any]) -> str:
+    """How the size went along the records, if it was not the same everywhere."""
+    if not effect["sizes"]:
+        return ""
+    least, most = (f(s["estimate"] for s in effect["sizes"]) for f in (min, max))
+    where = {"shared": "", "per_flight": "another in every flight", "per_record": "another in every record"}
+    how = [where[effect["scope"]]] * bool(where[effect["scope"]]) + ["changing in time"] * bool(effect["history"])
+    return f", {' and '.join(how)}: {least:.3g} to {most:.3g}"
 
 
 def _closing(found: Diagnosis) -> str:

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from icing_env.record import FloatArray
 from sim2real import gap
-from sim2real.channels import MEASURED, TOLERANCE
+from sim2real.channels import TOLERANCE
 from sim2real.diagnosis import Diagnosis
 from sim2real.paths import driven
-from sim2real.where import Stretch, stretches
+from sim2real.where import stretches
 from sim2real.windows import COMPARED, cut, residuals
-from sim2real.words import sentences
+from sim2real.words import of_the_model, sentences
 from testbed.commands.common import plain
-from testbed.plot_style import ROLES, scale_of, styled
+from testbed.diagnosis_figures import bars, heat, ladder_gaps, regime_heat, size_histories
+from testbed.plot_style import scale_of
 from testbed.plotting import gap_bars, time_histories
 from testbed.report import Report
 
@@ -44,6 +44,8 @@ def build(found: Diagnosis, result: Mapping[str, Any]) -> Report:
     report.verdict(sentences(found)[0], KIND[found.verdict])
     for sentence in sentences(found)[1:]:
         report.text(sentence)
+    if told := of_the_model(found):
+        report.text(told)
     _explanations(report, result)
     _where(report, found, result)
     _closing(report, found, result)
@@ -64,7 +66,7 @@ def _of_what(found: Diagnosis) -> str:
 def _explanations(report: Report, result: Mapping[str, Any]) -> None:
     report.section("Explanations")
     shown = [h for h in result["hypotheses"] if h["probability"] >= 1e-3][:12] or result["hypotheses"][:1]
-    report.figure(_bars({_label(h): h["probability"] for h in reversed(shown)}, "probability"),
+    report.figure(bars({_label(h): h["probability"] for h in reversed(shown)}, "probability"),
                   "Probability of each explanation, given these records.")
     rows: list[list[Any]] = []
     for effect in result["effects"]:
@@ -74,6 +76,10 @@ def _explanations(report: Report, result: Mapping[str, Any]) -> None:
     if rows:
         report.table(["effect", "probability", "parameter", "estimate", "95 %", "cannot be told from"], rows,
                      "Effects that these records leave possible.")
+    for effect in result["effects"]:
+        if effect["sizes"]:
+            report.figure(size_histories(effect), f"The size of {effect['name']} by stretch of every record, with its "
+                          "95 % interval (blue); dashed: the one size that fits all records.")
     if result["unknown"]:
         _terms(report, result["unknown"], "What the library lacks")
     for effect in result["effects"]:
@@ -102,10 +108,10 @@ def _where(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:
     if result["where"]["components"]:
         report.table(["component", "probability that the gap enters there"],
                      [[c, f"{p:.3f}"] for c, p in result["where"]["components"].items()], "Where the gap enters.")
-    report.figure(_heat(training, [len(cut(f).first) for f in found.details.flights]),
+    report.figure(heat(training, [len(cut(f).first) for f in found.details.flights]),
                   "Residual by channel and window, in tolerances, before the diagnosis.")
     if flown := stretches(found.details.evidences):
-        report.figure(_regime_heat(flown),
+        report.figure(regime_heat(flown),
                       "One-step predictions by channel and flight regime (quarters of each variable, low to high): "
                       "root mean square error over what noise and gusts make. Dots: beyond chance (false discoveries "
                       "5 %).")
@@ -141,10 +147,11 @@ def _closing(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> Non
 
 
 def _ladder(report: Report, ladder: Mapping[str, Any]) -> None:
-    report.figure(_rungs(ladder), "The evidence ladder: the gap left on the held-out records by the model as it is, "
-                  "by the best explanation that shares nothing with the diagnosed one, by the diagnosed one, and by a "
-                  "regression that knows no physics. Whiskers: 95 % intervals over windows. Dashed: what noise and "
-                  "gusts alone stay below 95 times in 100.")
+    report.figure(ladder_gaps(ladder),
+                  "The evidence ladder: the gap left on the held-out records by the model as it is, by the best "
+                  "explanation that shares nothing with the diagnosed one, by the diagnosed one, and by a regression "
+                  "that knows no physics. Whiskers: 95 % intervals over windows. Dashed: what noise and gusts alone "
+                  "stay below 95 times in 100.")
     none = ladder["no_gap"]
     report.text(f"On synthetic records without a gap the same search picks {', '.join(none['effects'])} as its best "
                 f"explanation (probability of no gap {none['probability_no_gap']:.2f}) and closes "
@@ -168,80 +175,3 @@ def _label(hypothesis: Mapping[str, Any]) -> str:
 
 def _tolerances() -> FloatArray:
     return np.array([TOLERANCE[c] for c in COMPARED])
-
-
-@styled
-def _bars(values: Mapping[str, float], label: str) -> Figure:
-    figure = Figure(figsize=(9.2, 0.9 + 0.32 * len(values)), layout="constrained")
-    axes = figure.subplots()
-    axes.barh(list(values), list(values.values()), 0.6, color=ROLES["estimate"]["color"])
-    axes.set_xlim(0.0, 1.0)
-    axes.set_xlabel(label)
-    axes.grid(False, axis="y")
-    return figure
-
-
-@styled
-def _rungs(ladder: Mapping[str, Any]) -> Figure:
-    """The gap each rung leaves, with the interval that its closure has."""
-    rungs = list(reversed(ladder["rungs"]))
-    figure = Figure(figsize=(9.2, 1.1 + 0.42 * len(rungs)), layout="constrained")
-    axes = figure.subplots()
-    before = next(r["gap"] for r in rungs if r["name"] == "nothing")
-    for y, rung in enumerate(rungs):
-        role = "protected" if rung["name"] == "diagnosed" else "iced" if rung["name"] == "nothing" else "estimate"
-        axes.barh(y, rung["gap"], 0.6, color=ROLES[role]["color"])
-        end = rung["gap"]
-        if rung["closure"] is not None and rung["closure_low95"] is not None and rung["name"] != "nothing":
-            low, end = (max(before * (1.0 - rung[f"closure_{side}95"]), 0.0) for side in ("high", "low"))
-            axes.plot([low, end], [y, y], color=ROLES["truth"]["color"], marker="|", markersize=9)
-            axes.annotate(f"{100.0 * rung['closure']:.0f} % closed", (max(end, rung["gap"]), y), (6, 0),
-                          textcoords="offset points", va="center")  # fmt: skip
-    axes.axvline(ladder["noise95"], **ROLES["limit"])
-    names = {"nothing": "nothing: the model", "black box": "black box: no physics"}
-    axes.set_yticks(range(len(rungs)), [names.get(r["name"], f"{r['name']}: {', '.join(r['effects'])}") for r in rungs])
-    axes.set_xlim(0.0, 1.18 * max(r["gap"] for r in rungs))
-    axes.set_xlabel("gap on the held-out records (tolerances)")
-    axes.grid(False, axis="y")
-    return figure
-
-
-@styled
-def _heat(energy: gap.Energy, windows: Sequence[int]) -> Figure:
-    """Channels by windows; `windows` of each record, one after another."""
-    shown = [j for j in range(len(COMPARED)) if np.isfinite(energy.before[:, j]).any()]
-    values = np.sqrt(energy.before[:, shown].T)
-    figure = Figure(figsize=(9.2, 1.0 + 0.3 * len(shown)), layout="constrained")
-    axes = figure.subplots()
-    image = axes.imshow(values, aspect="auto", cmap="viridis", vmin=0.0)
-    axes.set_yticks(range(len(shown)), [scale_of(COMPARED[j]).label for j in shown])
-    edges = np.cumsum([0, *windows]) - 0.5
-    for edge in edges[1:-1]:
-        axes.axvline(edge, color="white", linewidth=2.0)
-    axes.set_xticks(0.5 * (edges[1:] + edges[:-1]), [f"record {k}" for k in range(1, len(edges))])
-    axes.set_xlabel("windows of 10 s, one record after another")
-    axes.grid(False)
-    figure.colorbar(image, ax=axes, label="tolerances")
-    return figure
-
-
-def _regime_heat(found: list[Stretch]) -> Figure:
-    """Channels by quarters of each variable; a dot where the error is beyond chance."""
-    shown = [c for c in range(len(MEASURED)) if any(np.isfinite(s.excess[c]) for s in found)]
-    values = np.sqrt(np.maximum(np.array([s.excess[shown] for s in found]).T + 1.0, 0.0))
-    figure = Figure(figsize=(9.2, 1.2 + 0.3 * len(shown)), layout="constrained")
-    axes = figure.subplots()
-    image = axes.imshow(values, aspect="auto", cmap="viridis", vmin=0.8, vmax=max(2.0, float(np.nanmax(values))))
-    at, row = np.nonzero(np.array([s.shown[shown] for s in found]))
-    axes.plot(at, row, "o", color="white", markeredgecolor="black", markersize=4)
-    names = list(dict.fromkeys(s.variable for s in found))
-    first = [next(i for i, s in enumerate(found) if s.variable == name) for name in names]
-    last = [*first[1:], len(found)]
-    axes.set_xticks([0.5 * (a + b - 1) for a, b in zip(first, last, strict=True)],
-                    [scale_of(name).label for name in names], rotation=30, ha="right")  # fmt: skip
-    for edge in first[1:]:
-        axes.axvline(edge - 0.5, color="white", linewidth=2.0)
-    axes.set_yticks(range(len(shown)), [scale_of(MEASURED[c]).label for c in shown])
-    axes.grid(False)
-    figure.colorbar(image, ax=axes, label="error over noise and gusts")
-    return figure

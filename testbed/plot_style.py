@@ -70,7 +70,7 @@ SCALES: dict[str, Scale] = {
         ("throttle", "%", 100.0), ("thrust", "kN", 1.0e-3), ("torque", "kN m", 1.0e-3), ("rpm", "1/min", 1.0))
        for side in ("left", "right")},
     "lwc": Scale("liquid water", "g/m³", 1.0e3), "mvd": Scale("drop size", "µm", 1.0e6),
-    "pressure": Scale("pressure", "hPa", 1.0e-2), "mass": Scale("mass", "kg"),
+    "pressure": Scale("pressure", "hPa", 1.0e-2), "mass": Scale("mass", "kg"), "ice": Scale("water met", "kg/m²"),
     "severity": Scale("severity", ""), "confidence": Scale("confidence", "%", 100.0),
     "excess_drag": Scale("excess drag", "counts", 1.0e4),
 }  # fmt: skip

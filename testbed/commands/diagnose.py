@@ -118,7 +118,7 @@ def answer(found: Diagnosis) -> dict[str, Any]:
 
 def show(found: Diagnosis, result: dict[str, Any]) -> None:
     """The verdict in plain sentences, then the evidence as tables."""
-    from sim2real.words import sentences
+    from sim2real.words import of_the_model, sentences
 
     for sentence in sentences(found):
         click.echo(sentence)
@@ -145,6 +145,8 @@ def show(found: Diagnosis, result: dict[str, Any]) -> None:
     if result["not_testable"]:
         click.echo()
         click.echo("Not testable: " + "; ".join(f"{n['effect']} ({n['why']})" for n in result["not_testable"]))
+    if told := of_the_model(found):
+        click.echo(told)
     for problem in result["data_problems"]:
         click.echo(f"Record: {problem['channel']} {problem['kind']}")
 
