@@ -25,6 +25,7 @@ from sim2real.screen import Points, screen, screened
 from sim2real.settling import differ, followed, gains_with, gather_about, length, nearer
 from sim2real.steps import FARTHEST
 from sim2real.tempering import temper, total
+from sim2real.varying import varying
 
 RELINEARISE = 8.0  # whitened distance of the fitted nuisances beyond which all is flown again about them
 AGAIN = 2  # times at most
@@ -62,7 +63,8 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
         if found.judged_anew():
             progress("flying the leading explanations again, gusts and remainder judged with them")
             found.refine()
-    return found.evidences, replace(found.posterior, hypotheses=doubted(normalised(found.posterior.hypotheses)))
+    posterior = varying(flights, candidates, found.evidences, baseline, found.posterior, found.centre)
+    return found.evidences, replace(posterior, hypotheses=doubted(normalised(posterior.hypotheses)))
 
 
 class _Weighing:

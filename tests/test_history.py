@@ -10,11 +10,10 @@ import pytest
 
 from icing_env import effects, scenario
 from icing_env.record import FlightRecord
-from sim2real.by_stretch import cut_up, responses
+from sim2real.by_stretch import BY_RECORD, SHARED, cut_up, random_walk, responses, ways_of
 from sim2real.candidates import bank
 from sim2real.diagnosis import Diagnosis, diagnose
 from sim2real.evidence import gather
-from sim2real.history import BY_RECORD, SHARED, _random_walk, _ways
 from sim2real.reconstruct import reconstruct
 from sim2real.where import _variable
 from testbed.flight import fly
@@ -81,26 +80,26 @@ def test_stretches_together_are_the_whole(name, parameter, size):
     evidence = gather(flight, replace(bank(), families=(), terms=(), size=1, nuisances=()))
     rows = effects.with_effects(np.repeat(flight.parameters, 2), {name: {parameter: np.array([0.0, size])}})
     cut = cut_up(flight)
-    channels, _, _ = responses(evidence, rows, cut)
-    whole = responses(evidence, rows, cut[[0, -1]])[0][:, 1]
+    channels, _, _ = responses(evidence, np.tile(rows, (len(cut) - 1, 1)), cut)
+    whole = responses(evidence, rows[None], cut[[0, -1]])[0][:, 1]
     assert np.linalg.norm(channels[:, 1:].sum(axis=1) - whole) < 0.02 * np.linalg.norm(whole)
     assert np.linalg.norm(whole) > 0.0
 
 
 def test_a_random_walk_departs_from_its_mean():
-    walk = _random_walk(9)
+    walk = random_walk(9)
     assert walk.shape == (9, 8)
     assert np.allclose(walk.mean(axis=0), 0.0)
     assert np.allclose(np.sum((walk[-1] - walk[0]) ** 2), 1.0)  # from end to end as far as one unit
-    assert _random_walk(1).shape == (1, 0)
+    assert random_walk(1).shape == (1, 0)
 
 
 def test_ways_to_depart_are_those_that_the_records_allow():
     owner = np.array([0, 0, 0, 1, 1, 2])
-    told = [(way.scope, way.in_time) for way in _ways(owner, ["a", "a", "b"])]
+    told = [(way.scope, way.in_time) for way in ways_of(owner, ["a", "a", "b"])]
     assert told == [("shared", False), ("shared", True), ("per_flight", False), ("per_record", False),
                     ("per_record", True)]  # fmt: skip
-    assert [(way.scope, way.in_time) for way in _ways(np.zeros(1, int), ["a"])] == [("shared", False)]
+    assert [(way.scope, way.in_time) for way in ways_of(np.zeros(1, int), ["a"])] == [("shared", False)]
 
 
 def test_ice_is_the_water_met():

@@ -1,0 +1,139 @@
+"""A gap that no one size of any effect explains: an effect whose size is another elsewhere, or changes in time.
+
+Ice that grows, or a bias that wanders, is something unknown to all that has one size, and the same generic terms in
+time may follow it. Where something unknown alone is likeliest, every effect that enters where it does is flown with a
+size for each stretch of every record; their departures from a common size are Gaussian (see `sim2real.by_stretch`), and
+what so many numbers take by luck they pay for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from icing_env import effects
+from icing_env.record import FloatArray
+from sim2real.by_stretch import Way, cut_up, gaussian, products, responses, ways, without
+from sim2real.candidates import Bank, Family, shifted, unbroken
+from sim2real.courses import projected
+from sim2real.evidence import Evidence
+from sim2real.form import forgiven
+from sim2real.history import SPREADS, VARIES
+from sim2real.hypotheses import Hypothesis, Posterior, normalised
+from sim2real.reconstruct import Reconstruction
+from sim2real.references import Baseline
+from sim2real.sets import SetFit
+from sim2real.side_by_side import each
+from sim2real.steps import FARTHEST
+
+ROUNDS = 3  # times that the sizes are flown
+STEP = 0.05  # of the typical size, for slopes
+REACH = 2.5  # typical sizes: standard deviation of the common one (assumed)
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Sizes of one effect [T] and nuisances [n]; log evidence but for that of nothing at all, and square left over."""
+
+    sizes: FloatArray
+    nuisances: FloatArray
+    log: float
+    left: float
+    error: float  # of the mean size
+
+
+def varying(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
+            posterior: Posterior, centre: FloatArray) -> Posterior:  # fmt: skip
+    """The posterior with effects of varying size where something unknown alone is likeliest.
+
+    Args:
+        flights: the diagnosed records about the baseline.
+        candidates, evidences: what was flown along them.
+        baseline: the model and its precision.
+        posterior: what the records say of effects of one size.
+        centre: nuisances [n] that the variants were flown about.
+    """
+    best = posterior.best
+    if best.unknown is None or best.effects:
+        return posterior
+    home = [f for f in unbroken(candidates.families)
+            if best.unknown.component in f.effect.enters_at and f.effect.name in posterior.fits]
+    found = [(f, _fitted(flights, candidates, evidences, baseline, posterior.tempering, f, centre)) for f in home]
+    nothing, noise = float(posterior.reduced[0, 0]), sum(e.samples for e in evidences) / posterior.tempering
+    least = min([h.left for h in posterior.hypotheses] + [fit.left for _, fit in found] + [noise])
+    single = next(h.log_prior for h in posterior.hypotheses if len(h.effects) == 1 and h.unknown is None)
+    told = {h.effects: h for h in posterior.hypotheses if h.unknown is None}
+    for family, fit in found:
+        own = told.get((family.effect.name,))
+        log = fit.log + 0.5 * nothing
+        varied = Hypothesis(_set_fit(candidates, family, fit, log), None, single + float(np.log(VARIES)), log,
+                            regained=forgiven(fit.left - least, nothing - fit.left))  # fmt: skip
+        if own is None or varied.log_posterior > own.log_posterior:
+            told[varied.effects] = varied
+    out = normalised([*told.values(), *(h for h in posterior.hypotheses if h.unknown is not None)], 0.0)
+    chosen = next((fit for family, fit in found if out[0].effects == (family.effect.name,)), None)
+    return replace(posterior, hypotheses=out, settled=posterior.settled if chosen is None else chosen.nuisances)
+
+
+def _set_fit(candidates: Bank, family: Family, fit: _Fit, log: float) -> SetFit:
+    """An effect at its mean size."""
+    p, mean = family.parameter, float(np.mean(fit.sizes))
+    own = next(f for f in candidates.families if f.effect is family.effect and f.parameter is p
+               and f.low - 1e-9 <= mean <= f.high + 1e-9)  # fmt: skip
+    low, high = (float(np.clip(mean + side * 1.96 * fit.error, p.low, p.high)) for side in (-1.0, 1.0))
+    return SetFit((own,), log, (mean,), (low,), (high,), np.array([[fit.error**2]]), None, fit.left)
+
+
+def _fitted(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
+            tempering: float, family: Family, centre: FloatArray) -> _Fit:  # fmt: skip
+    """Sizes of one effect for every stretch, by Gauss and Newton, each step flown anew."""
+    p, n = family.parameter, len(centre)
+    cuts = [cut_up(flight) for flight in flights]
+    counts = [len(cut) - 1 for cut in cuts]
+    sizes, nuisances = np.full(sum(counts), p.neutral), np.clip(centre, -FARTHEST, FARTHEST)
+    step = STEP * (p.typical or 0.25 * (p.high - p.low))
+    for _ in range(ROUNDS):
+        own = np.split(sizes, np.cumsum(counts)[:-1])
+        rows = [_rows(f, candidates, nuisances, family, s, step) for f, s in zip(flights, own, strict=True)]
+        gram = products(each(responses, evidences, rows, cuts), baseline.precision, nuisances, tempering)
+        found = _best(gram, n, (sizes - p.neutral) / step, ways(flights, cuts)[1:])
+        now = np.clip(p.neutral + step * found.sizes, p.low, p.high)
+        asked = gram[1 : 1 + n, 0] + gram[1 : 1 + n, 1 + n :] @ (now - sizes) / step
+        give = np.linalg.solve(gram[1 : 1 + n, 1 : 1 + n], asked)
+        sizes, nuisances = now, np.clip(nuisances - give, -FARTHEST, FARTHEST)
+    return replace(found, sizes=sizes, nuisances=nuisances, error=abs(step) * found.error)
+
+
+def _rows(flight: Reconstruction, candidates: Bank, nuisances: FloatArray, family: Family, sizes: FloatArray,
+          step: float) -> NDArray:
+    """PARAMETERS in every stretch with the effect at its size there, and a step beside it [S, 2]."""
+    base = shifted(flight.parameters, candidates.nuisances, nuisances, flight.power_from)
+    both = np.stack([sizes, sizes + step], axis=1)
+    values: dict[str, dict[str, float | FloatArray]] = {
+        family.effect.name: {**family.effect.neutral(), family.parameter.name: both.ravel()}}
+    return effects.with_effects(np.repeat(base, both.size), values).reshape(both.shape)
+
+
+def _best(gram: FloatArray, n: int, sizes: FloatArray, tried: Sequence[Way]) -> _Fit:
+    """Sizes that are likeliest, all in steps from none.
+
+    Args:
+        gram: of what is left with `sizes`, nuisances [n], and a step in every stretch.
+        tried: ways in which sizes may differ.
+    """
+    flown = without(projected(gram, 1 + n), sizes)
+    logs, fits = [], []
+    for way in tried:
+        for spread in SPREADS:
+            moves = np.column_stack([np.full(len(sizes), REACH), spread * way.columns]) / STEP
+            log, mean, covariance = gaussian(flown, moves)
+            logs.append(log)
+            fits.append((moves @ mean, moves.mean(axis=0) @ covariance @ moves.mean(axis=0)))
+    there, variance = fits[int(np.argmax(logs))]
+    left = float(flown[0, 0] + 2.0 * there @ flown[1:, 0] + there @ flown[1:, 1:] @ there)
+    log = float(logsumexp(logs) - np.log(len(logs)) - 0.5 * flown[0, 0])
+    return _Fit(there, np.zeros(n), log, left, float(np.sqrt(variance)))
