@@ -22,7 +22,7 @@ from sim2real.candidates import Bank, Family, shifted, unbroken
 from sim2real.courses import projected
 from sim2real.evidence import Evidence
 from sim2real.form import forgiven
-from sim2real.history import SPREADS, VARIES
+from sim2real.history import SPREADS
 from sim2real.hypotheses import Hypothesis, Posterior, normalised
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
@@ -33,6 +33,9 @@ from sim2real.steps import FARTHEST
 ROUNDS = 3  # times that the sizes are flown
 STEP = 0.05  # of the typical size, for slopes
 REACH = 2.5  # typical sizes: standard deviation of the common one (assumed)
+# Prior probability that a size varies so much that one size explains nothing (assumed): what goes with speed, and is
+# another in every record for that, is rather something unknown.
+VARIES = 0.01
 
 
 @dataclass(frozen=True)
