@@ -106,7 +106,7 @@ def size_histories(effect: Mapping[str, Any]) -> Figure:
             axes.fill_between(span, s["low95"], s["high95"], color=ROLES["estimate"]["color"], alpha=0.18,
                               linewidth=0.0)  # fmt: skip
             axes.plot(span, [s["estimate"]] * 2, **ROLES["estimate"])
-        axes.axhline(common["estimate"], **ROLES["clean"])
+        axes.axhline(common["estimate"], **{**ROLES["clean"], "linestyle": "--"})
         axes.set_title(f"record {record + 1}", loc="left")
         axes.set_xlabel("time (s)")
         axes.margins(x=0.0)

@@ -79,7 +79,7 @@ def _explanations(report: Report, result: Mapping[str, Any]) -> None:
     for effect in result["effects"]:
         if effect["sizes"]:
             report.figure(size_histories(effect), f"The size of {effect['name']} by stretch of every record, with its "
-                          "95 % interval (blue); dashed: the one size that fits all records.")
+                          "95 % interval (shaded); dashed: one size for all records.")
     if result["unknown"]:
         _terms(report, result["unknown"], "What the library lacks")
     for effect in result["effects"]:

@@ -59,6 +59,7 @@ def test_an_injected_effect_is_found_with_its_size(effect, value):
     half = 0.5 * (fitted["high95"] - fitted["low95"])
     assert abs(fitted["estimate"] - value) < 3.0 * half
     assert half < abs(value)
+    assert [found.effects[0][key] for key in ("scope", "history", "sizes")] == ["shared", None, None]
 
 
 def test_the_gap_of_a_found_effect_closes_on_a_record_not_used():

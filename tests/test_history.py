@@ -56,11 +56,6 @@ def told(found: Diagnosis, name: str) -> dict:
     return next(effect for effect in found.effects if effect["name"] == name)
 
 
-def test_one_size_in_two_records_is_shared():
-    entry = told(diagnose([with_alpha(flown(3), 0.012), with_alpha(flown(4), 0.012)]), "alpha_bias")
-    assert (entry["scope"], entry["history"], entry["sizes"]) == (SHARED, None, None)
-
-
 def test_another_size_in_each_record_is_told_by_record():
     entry = told(diagnose([with_alpha(flown(3), 0.006), with_alpha(flown(4), 0.018)]), "alpha_bias")
     assert (entry["scope"], entry["history"]) == (BY_RECORD, None)
