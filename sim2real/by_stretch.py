@@ -16,10 +16,11 @@ from scipy.linalg import block_diag
 
 from icing_env.record import FloatArray
 from sim2real.candidates import NUISANCE_STEP
-from sim2real.evidence import SETTLE, Evidence, whiten
+from sim2real.channels import MEASURED
+from sim2real.evidence import FARTHEST, SETTLE, Evidence, departures
 from sim2real.means import without_means
 from sim2real.paths import path_residuals
-from sim2real.predictor import Predictor, held
+from sim2real.predictor import Predictor, held, lost
 from sim2real.reconstruct import Reconstruction
 from sim2real.sets import firm
 
@@ -63,9 +64,10 @@ def responses(evidence: Evidence, rows: NDArray, cut: NDArray[np.intp]) -> tuple
         flown.fleet.parameters[:] = off[0]
         flown.fleet.parameters[own] = off[1:]
         left.append(flown.fly(end - start, start, evidence.gain.K))
-    white = whiten(np.concatenate(left), evidence.factor)[first:]
-    white[:, 1:] -= white[:, :1]
-    channels = without_means(np.swapaxes(white, 1, 2).reshape(-1, white.shape[1]), flight, first)
+    kept = lost(np.concatenate(left), np.isfinite(flight.measured[1:]))[first:]
+    channels = np.empty((len(kept) * len(MEASURED), kept.shape[1]))
+    departures(kept, kept.shape[1], evidence.factor[first:], FARTHEST, channels)
+    channels = without_means(channels, flight, first)
     return channels, _of_paths(flight, rows, cut), evidence.rows
 
 

@@ -110,7 +110,7 @@ def flown(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain:
     at = np.array([(i, index[row]) for i, row in enumerate(keep) if row in index], np.intp).reshape(-1, 2)
     for k in range(first, len(left), CHUNK):
         flat = np.empty((len(left[k : k + CHUNK]) * len(MEASURED), len(index)))
-        _departures(left[k : k + CHUNK], len(moved), factor[k : k + CHUNK], FARTHEST, flat)
+        departures(left[k : k + CHUNK], len(moved), factor[k : k + CHUNK], FARTHEST, flat)
         if linear.rows:
             flat[:, len(moved) :] = linear.values[(k - first) * len(MEASURED) :][: len(flat)]
         whitened[k : k + CHUNK] = flat[:, 0].reshape(-1, len(MEASURED))
@@ -213,7 +213,7 @@ def whiten(left: FloatArray, factor: FloatArray) -> FloatArray:
 
 
 @entry
-def _departures(left: Any, count: int, factor: Any, farthest: float, out: Any) -> None:
+def departures(left: Any, count: int, factor: Any, farthest: float, out: Any) -> None:
     """The first row whitened as `whiten` does, and the others' departures from it, none beyond `farthest`.
 
     Args:

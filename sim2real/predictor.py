@@ -203,11 +203,11 @@ def with_spare(flight: Reconstruction, parameters: NDArray, gain: FloatArray,
     spare = -count % QUICK if count % QUICK > 1 and gain.ndim == 3 else 0
     flown = Predictor(flight, np.take(parameters, [*range(count), *[count - 1] * spare]))
     flown.place(0)
-    return _lost(flown.fly(len(flight.time) - 1, gain=gain, pushes=pushes), np.isfinite(flight.measured[1:]))
+    return lost(flown.fly(len(flight.time) - 1, gain=gain, pushes=pushes), np.isfinite(flight.measured[1:]))
 
 
-def _lost(left: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
-    """The same where a row that flew to no numbers at all is as far as can be from what was measured.
+def lost(left: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
+    """Innovations [N, rows, channels] where a row that flew to no numbers at all is as far off as can be.
 
     Else it would leave nothing, like a channel that was not measured, and be the best explanation of any record.
     """

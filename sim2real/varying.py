@@ -63,12 +63,16 @@ def varying(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
     best = posterior.best
     if best.unknown is None or best.effects:
         return posterior
+    cuts = [cut_up(flight) for flight in flights]
+    if len(tried := ways(flights, cuts)[1:]) == 0:  # one short record
+        return posterior
     home = [f for f in unbroken(candidates.families)
             if best.unknown.component in f.effect.enters_at and f.effect.name in posterior.fits]
-    found = [(f, _fitted(flights, candidates, evidences, baseline, posterior.tempering, f, centre)) for f in home]
+    flying = _Flying(flights, candidates, evidences, baseline, posterior.tempering, cuts, tried)
+    found = [(f, flying.fitted(f, centre)) for f in home]
     nothing, noise = float(posterior.reduced[0, 0]), sum(e.samples for e in evidences) / posterior.tempering
     least = min([h.left for h in posterior.hypotheses] + [fit.left for _, fit in found] + [noise])
-    single = next(h.log_prior for h in posterior.hypotheses if len(h.effects) == 1 and h.unknown is None)
+    single = max((h.log_prior for h in posterior.hypotheses if len(h.effects) == 1), default=-np.inf)
     told = {h.effects: h for h in posterior.hypotheses if h.unknown is None}
     for family, fit in found:
         own = told.get((family.effect.name,))
@@ -91,24 +95,35 @@ def _set_fit(candidates: Bank, family: Family, fit: _Fit, log: float) -> SetFit:
     return SetFit((own,), log, (mean,), (low,), (high,), np.array([[fit.error**2]]), None, fit.left)
 
 
-def _fitted(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
-            tempering: float, family: Family, centre: FloatArray) -> _Fit:  # fmt: skip
-    """Sizes of one effect for every stretch, by Gauss and Newton, each step flown anew."""
-    p, n = family.parameter, len(centre)
-    cuts = [cut_up(flight) for flight in flights]
-    counts = [len(cut) - 1 for cut in cuts]
-    sizes, nuisances = np.full(sum(counts), p.neutral), np.clip(centre, -FARTHEST, FARTHEST)
-    step = STEP * (p.typical or 0.25 * (p.high - p.low))
-    for _ in range(ROUNDS):
-        own = np.split(sizes, np.cumsum(counts)[:-1])
-        rows = [_rows(f, candidates, nuisances, family, s, step) for f, s in zip(flights, own, strict=True)]
-        gram = products(each(responses, evidences, rows, cuts), baseline.precision, nuisances, tempering)
-        found = _best(gram, n, (sizes - p.neutral) / step, ways(flights, cuts)[1:])
-        now = np.clip(p.neutral + step * found.sizes, p.low, p.high)
-        asked = gram[1 : 1 + n, 0] + gram[1 : 1 + n, 1 + n :] @ (now - sizes) / step
-        give = np.linalg.solve(gram[1 : 1 + n, 1 : 1 + n], asked)
-        sizes, nuisances = now, np.clip(nuisances - give, -FARTHEST, FARTHEST)
-    return replace(found, sizes=sizes, nuisances=nuisances, error=abs(step) * found.error)
+@dataclass(frozen=True)
+class _Flying:
+    """What flying sizes by stretch along some records takes; `tried`: ways in which sizes may differ."""
+
+    flights: Sequence[Reconstruction]
+    candidates: Bank
+    evidences: Sequence[Evidence]
+    baseline: Baseline
+    tempering: float
+    cuts: Sequence[NDArray[np.intp]]
+    tried: Sequence[Way]
+
+    def fitted(self, family: Family, centre: FloatArray) -> _Fit:
+        """Sizes of one effect for every stretch, by Gauss and Newton from none, each step flown anew."""
+        p, n, counts = family.parameter, len(centre), [len(cut) - 1 for cut in self.cuts]
+        sizes, nuisances = np.full(sum(counts), p.neutral), np.clip(centre, -FARTHEST, FARTHEST)
+        step = STEP * (p.typical or 0.25 * (p.high - p.low))
+        for _ in range(ROUNDS):
+            own = np.split(sizes, np.cumsum(counts)[:-1])
+            rows = [_rows(flight, self.candidates, nuisances, family, s, step)
+                    for flight, s in zip(self.flights, own, strict=True)]
+            made = each(responses, self.evidences, rows, self.cuts)
+            gram = products(made, self.baseline.precision, nuisances, self.tempering)
+            found = _best(gram, n, (sizes - p.neutral) / step, self.tried)
+            now = np.clip(p.neutral + step * found.sizes, p.low, p.high)
+            asked = gram[1 : 1 + n, 0] + gram[1 : 1 + n, 1 + n :] @ (now - sizes) / step
+            give = np.linalg.solve(gram[1 : 1 + n, 1 : 1 + n], asked)
+            sizes, nuisances = now, np.clip(nuisances - give, -FARTHEST, FARTHEST)
+        return replace(found, sizes=sizes, nuisances=nuisances, error=abs(step) * found.error)
 
 
 def _rows(flight: Reconstruction, candidates: Bank, nuisances: FloatArray, family: Family, sizes: FloatArray,

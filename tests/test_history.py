@@ -120,3 +120,10 @@ def test_ice_is_the_water_met():
     assert met[round(9.0 / flight.dt)] == pytest.approx(0.0, abs=1e-9)
     way = np.sum(flight.channel("airspeed")[flight.time > 10.0]) * flight.dt
     assert met[-1] == pytest.approx(5e-4 * way, rel=0.01)
+
+
+def test_one_short_record_has_no_stretches_to_differ():
+    record = flown(3).slice(0.0, 9.0)
+    found = diagnose([with_alpha(record, 0.02 * np.sin(record.time))])
+    assert found.verdict == "unknown"
+    assert all(effect["sizes"] is None for effect in found.effects)
