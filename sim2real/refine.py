@@ -55,6 +55,7 @@ from sim2real.other_form import WORTH, Bent, flown_squares, flown_unknown, other
 from sim2real.points import Flying
 from sim2real.sets import SetFit
 from sim2real.steps import Point
+from sim2real.tempering import noise
 from sim2real.terms import in_what_is_left
 
 MOST = 12  # explanations flown again; what looks better then and has not been flown is not believed
@@ -89,9 +90,8 @@ class _Search:
         self.generic: dict[int, list[UnknownFit]] = {}
         self.beginning: dict[int, FloatArray] = {}  # nuisances that sets within a flown one start from
         self.added: set[int] = set()  # proposed beside a flown one: no linear fit to correct others by
-        self.nothing, self.noise = float(posterior.reduced[0, 0]), np.inf
-        if posterior.tempering > 1.0:
-            self.noise = sum(e.samples for e in flying.evidences) / posterior.tempering
+        self.nothing = float(posterior.reduced[0, 0])
+        self.noise = noise(flying.evidences, posterior.tempering)
 
     def fly(self, waiting: Iterable[int]) -> None:
         """Fly hypotheses, and correct by them those that were not flown."""

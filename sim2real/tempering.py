@@ -17,6 +17,11 @@ def total(evidences: Sequence[Evidence]) -> FloatArray:
     return np.asarray(np.sum([e.gram for e in evidences], axis=0))
 
 
+def noise(evidences: Sequence[Evidence], tempering: float) -> float:
+    """Tempered whitened square that noise alone would leave, if it is known to be less than what is left."""
+    return sum(e.samples for e in evidences) / tempering if tempering > 1.0 else np.inf
+
+
 def temper(misfit: float, evidences: Sequence[Evidence]) -> float:
     """What to divide the evidence by because even the best explanation leaves more than noise, and that coloured.
 

@@ -29,6 +29,7 @@ from sim2real.references import Baseline
 from sim2real.sets import SetFit
 from sim2real.side_by_side import each
 from sim2real.steps import FARTHEST
+from sim2real.tempering import noise
 
 ROUNDS = 3  # times that the sizes are flown
 STEP = 0.05  # of the typical size, for slopes
@@ -70,20 +71,21 @@ def varying(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
             if best.unknown.component in f.effect.enters_at and f.effect.name in posterior.fits]
     flying = _Flying(flights, candidates, evidences, baseline, posterior.tempering, cuts, tried)
     found = [(f, flying.fitted(f, centre)) for f in home]
-    nothing, noise = float(posterior.reduced[0, 0]), sum(e.samples for e in evidences) / posterior.tempering
-    least = min([h.left for h in posterior.hypotheses] + [fit.left for _, fit in found] + [noise])
+    nothing = float(posterior.reduced[0, 0])
+    least = min(noise(evidences, posterior.tempering), *(h.left for h in posterior.hypotheses),
+                *(fit.left for _, fit in found))  # fmt: skip
     single = max((h.log_prior for h in posterior.hypotheses if len(h.effects) == 1), default=-np.inf)
     told = {h.effects: h for h in posterior.hypotheses if h.unknown is None}
+    settled = dict[tuple[str, ...], FloatArray]()
     for family, fit in found:
         own = told.get((family.effect.name,))
         log = fit.log + 0.5 * nothing
         varied = Hypothesis(_set_fit(candidates, family, fit, log), None, single + float(np.log(VARIES)), log,
                             regained=forgiven(fit.left - least, nothing - fit.left))  # fmt: skip
         if own is None or varied.log_posterior > own.log_posterior:
-            told[varied.effects] = varied
+            told[varied.effects], settled[varied.effects] = varied, fit.nuisances
     out = normalised([*told.values(), *(h for h in posterior.hypotheses if h.unknown is not None)], 0.0)
-    chosen = next((fit for family, fit in found if out[0].effects == (family.effect.name,)), None)
-    return replace(posterior, hypotheses=out, settled=posterior.settled if chosen is None else chosen.nuisances)
+    return replace(posterior, hypotheses=out, settled=settled.get(out[0].effects, posterior.settled))
 
 
 def _set_fit(candidates: Bank, family: Family, fit: _Fit, log: float) -> SetFit:

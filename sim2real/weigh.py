@@ -24,7 +24,7 @@ from sim2real.refine import refine
 from sim2real.screen import Points, screen, screened
 from sim2real.settling import differ, followed, gains_with, gather_about, length, nearer
 from sim2real.steps import FARTHEST
-from sim2real.tempering import temper, total
+from sim2real.tempering import noise, temper, total
 from sim2real.varying import varying
 
 RELINEARISE = 8.0  # whitened distance of the fitted nuisances beyond which all is flown again about them
@@ -186,9 +186,8 @@ def weigh(evidences: Sequence[Evidence], candidates: Bank, untestable: dict[str,
     if tempering is None:
         left = least_misfit(tempered(1.0), candidates, tuple(untestable), nothing)
         tempering = max(temper(left, evidences), 1.0)
-    noise = sum(e.samples for e in evidences) / tempering if tempering > 1.0 else np.inf
-    posterior = replace(attribute(tempered(tempering), candidates, tuple(untestable), nothing, noise, free),
-                        tempering=tempering)
+    posterior = replace(attribute(tempered(tempering), candidates, tuple(untestable), nothing,
+                                  noise(evidences, tempering), free), tempering=tempering)  # fmt: skip
     quiet = [name for name, found in posterior.fits.items() if found.smallest is None]
     for name in quiet:
         untestable[name] = "no excitation: these records would not show it anywhere in its range"

@@ -142,26 +142,30 @@ def solve(case: Path, without: tuple[str, ...] = ()) -> dict[str, Any]:
     from testbed.commands.common import plain
     from testbed.commands.diagnose import answer
 
-    try:
+    def work() -> dict[str, Any]:
         records = [read(path) for path in sorted(case.glob("*.csv"))]
-        told = diagnose(records[:DIAGNOSED], records[DIAGNOSED:], without=without)
-        found: dict[str, Any] = plain(answer(told))
-    except InputError as error:
-        return {"error": str(error)}
-    except Exception as error:  # one case that fails must not cost the others their answers
-        return {"error": f"{type(error).__name__}: {error}"}
-    return found
+        told: dict[str, Any] = plain(answer(diagnose(records[:DIAGNOSED], records[DIAGNOSED:], without=without)))
+        return told
+
+    return answered(work)
 
 
 def solve_by(case: Path, rival: str) -> dict[str, Any]:
-    """A rival's answer to one case's records, in the same form; {"error": why} where a record is refused."""
+    """A rival's answer to one case's records, in the same form; {"error": why} where there is none."""
     from icing_env.record import read
     from testbed.rivals.solve import diagnose
 
+    return answered(lambda: diagnose(rival, [read(path) for path in sorted(case.glob("*.csv"))[:DIAGNOSED]]))
+
+
+def answered(work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """One case's answer; where a record is refused or `work` fails, why: it must not cost other cases their answers."""
     try:
-        return diagnose(rival, [read(path) for path in sorted(case.glob("*.csv"))[:DIAGNOSED]])
+        return work()
     except InputError as error:
         return {"error": str(error)}
+    except Exception as error:
+        return {"error": f"{type(error).__name__}: {error}"}
 
 
 def enter_ledger(path: Path, found: dict[str, Any], out: Path) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from icing_env.errors import InputError
-from testbed.diagnosis_benchmark import OPEN, closed
+from testbed.diagnosis_benchmark import OPEN, answered, closed
 from testbed.withheld.files import read_json, write_text
 from testbed.withheld.jsbsim_cases import Design, designs, write_case
 from testbed.withheld.jsbsim_edit import data_root
@@ -89,15 +89,13 @@ def solve(case: Path) -> dict[str, Any]:
     from testbed.commands.common import plain
     from testbed.commands.diagnose import answer
 
-    try:
+    def work() -> dict[str, Any]:
         records = [read(path) for path in sorted(case.glob("*.csv"))]
         of = {role: [r for r in records if r.meta.role == role] for role in ("diagnose", "held_out", "reference")}
-        found: dict[str, Any] = plain(answer(diagnose(of["diagnose"], of["held_out"], of["reference"])))
-    except InputError as error:
-        return {"error": str(error)}
-    except Exception as error:  # one case that fails must not cost the others their answers
-        return {"error": f"{type(error).__name__}: {error}"}
-    return found
+        told: dict[str, Any] = plain(answer(diagnose(of["diagnose"], of["held_out"], of["reference"])))
+        return told
+
+    return answered(work)
 
 
 def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[str]]]]:

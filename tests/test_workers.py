@@ -6,6 +6,8 @@ import os
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
+from icing_env.errors import InputError
+from testbed.diagnosis_benchmark import answered
 from testbed.workers import START, a_core_each
 
 
@@ -21,3 +23,13 @@ def test_workers_start_with_it_and_nobody_else(monkeypatch):
         assert list(pool.map(told, START)) == ["1", START["MALLOC_MMAP_THRESHOLD_"], "1000"]
     assert "OMP_NUM_THREADS" not in os.environ
     assert os.environ["MALLOC_TRIM_THRESHOLD_"] == "1000"
+
+
+def test_a_case_that_fails_is_an_answer_and_costs_no_other_its_own():
+    assert answered(lambda: {"verdict": "no_gap"}) == {"verdict": "no_gap"}
+    assert answered(lambda: refused("x")) == {"error": "no number: x"}
+    assert answered(lambda: {}["lacking"]) == {"error": "KeyError: 'lacking'"}
+
+
+def refused(text: str) -> dict[str, object]:
+    raise InputError(f"no number: {text}")
