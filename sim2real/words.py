@@ -17,14 +17,16 @@ def of_the_model(found: Diagnosis) -> str:
     told = found.provenance["model"]
     if told is None:
         return ""
-    kept = (f"the {found.provenance['references']} reference flights are followed with {told['walk']:g} times the "
-            "process noise of an aircraft that the model knows")
+    count, walk = found.provenance["references"], told["walk"]
+    flights = "its reference flight is" if count == 1 else f"its {count} reference flights are"
+    noise = "the process noise" if walk == 1.0 else f"{walk:g} times the process noise"
+    kept = f"{flights} followed with {noise} of an aircraft that the model knows"
     slow = sorted(told["colour"].items(), key=lambda item: -item[1])[:3]
     colour = [f"{channel} (by {ratio:.3g})" for channel, ratio in slow]
     less = f"; slow errors count for less in {', '.join(colour)}" if colour else ""
     home = list(told["explained_without_a_gap"])
     terms = f"; part of what {', '.join(home)} would explain is there without a gap" if home else ""
-    return f"Corrected by its references, {kept}{less}{terms}."
+    return f"With the model corrected, {kept}{less}{terms}."
 
 
 def _finding(found: Diagnosis) -> str:

@@ -19,6 +19,7 @@ from sim2real.inadequacy import BATCHES, colour
 from sim2real.means import without_means
 from sim2real.reconstruct import Inadequacy
 from sim2real.references import Baseline, fit_baseline
+from sim2real.words import of_the_model
 from testbed.withheld.draw import published_spread
 from testbed.withheld.files import record_text, side_text
 from testbed.withheld.flights import Aircraft, recorded
@@ -108,3 +109,17 @@ def test_an_aircraft_that_the_model_knows_is_disturbed_little_and_has_no_gap(tmp
     assert found.inadequacy.walk <= 10.0
     assert set(found.inadequacy.colour) <= {"airspeed", "ax", "altitude"} or max(found.inadequacy.colour.values()) < 4.0
     assert diagnose(again, reference=clean).verdict == "no_gap"
+
+
+def test_what_references_said_is_a_sentence():
+    told = {"walk": 30.0, "colour": {"ax": 40.0, "q": 5.0}, "means": {},
+            "explained_without_a_gap": {"pitching_moment": 9.0}}  # fmt: skip
+    one = {"walk": 1.0, "colour": {}, "means": {}, "explained_without_a_gap": {}}
+    assert of_the_model(SimpleNamespace(provenance={"references": 5, "model": told})) == (
+        "With the model corrected, its 5 reference flights are followed with 30 times the process noise of an aircraft "
+        "that the model knows; slow errors count for less in ax (by 40), q (by 5); part of what pitching_moment would "
+        "explain is there without a gap.")
+    assert of_the_model(SimpleNamespace(provenance={"references": 1, "model": one})) == (
+        "With the model corrected, its reference flight is followed with the process noise of an aircraft that the "
+        "model knows.")
+    assert of_the_model(SimpleNamespace(provenance={"references": 0, "model": None})) == ""
