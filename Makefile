@@ -21,7 +21,7 @@ demo: $(CORE)  ## install the core and fly the demonstration: out/demo/report.ht
 	$(BIN)/icing demo
 
 test: $(FULL) lint  ## install everything, check style, types and imports, run the tests (not the slow ones)
-	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m "not slow"
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m "not slow"
 
 test-slow: $(FULL)  ## the slow tests alone
 	$(BIN)/python -m pytest -q -m slow

@@ -29,7 +29,7 @@ from sim2real.reconstruct import Reconstruction, reconstruct
 from sim2real.references import Baseline, fit_baseline
 from sim2real.remedy import Remedy, leading, remedy, resimulation, values_of
 from sim2real.rollout import Rollout, difference, flying_as
-from sim2real.side_by_side import each
+from sim2real.side_by_side import algebra_in_one_thread, each
 from sim2real.singles import EffectFit
 from sim2real.surfaces import placed
 from sim2real.terms import in_common
@@ -73,6 +73,7 @@ class Details:
     tested: gap.Energy | None
 
 
+@algebra_in_one_thread
 def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] = (),
              reference: Sequence[FlightRecord] = (), without: Iterable[str] = (), seed: int = 0,
              progress: Progress = lambda text: None, climb: bool = False, simulator: Rollout | None = None

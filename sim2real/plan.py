@@ -23,6 +23,7 @@ from sim2real.channels import MEASURED
 from sim2real.manoeuvre import DURATION, MANOEUVRES, Manoeuvre
 from sim2real.planned import evidence, planned, template
 from sim2real.reconstruct import Reconstruction
+from sim2real.side_by_side import algebra_in_one_thread
 from sim2real.singles import DETECTABLE, INDISTINGUISHABLE
 from sim2real.weigh import Progress
 
@@ -80,6 +81,7 @@ class _Shown:
         return np.inf if self.smallest is None else abs(self.smallest / self.typical)
 
 
+@algebra_in_one_thread
 def plan(manoeuvres: Sequence[Manoeuvre], sigma: float = GUSTS, noise: Mapping[str, float] | None = None,
          without: Iterable[str] = (), altitude: float = ALTITUDE,
          progress: Progress = lambda text: None) -> Plan:  # fmt: skip

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import threading
 
+import numpy as np
 import pytest
+from threadpoolctl import threadpool_info
 
-from sim2real.side_by_side import each, threads
+from sim2real.side_by_side import algebra_in_one_thread, each, threads
 
 
 @pytest.mark.parametrize("told", ["1", "3"])
@@ -24,6 +26,16 @@ def test_two_are_under_way_at_once_where_two_may_be(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     meeting = threading.Barrier(2, timeout=20.0)
     assert sorted(each(lambda _: meeting.wait(), range(2))) == [0, 1]
+
+
+def test_linear_algebra_starts_no_threads_within_and_may_again_afterwards():
+    def of_algebra():
+        np.linalg.inv(np.eye(2))
+        return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+    before = of_algebra()
+    assert algebra_in_one_thread(of_algebra)() == {1}
+    assert of_algebra() == before
 
 
 def test_a_number_that_is_none_is_one_a_core(monkeypatch):
