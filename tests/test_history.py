@@ -57,7 +57,8 @@ def told(found: Diagnosis, name: str) -> dict:
 
 
 def test_another_size_in_each_record_is_told_by_record():
-    entry = told(diagnose([with_alpha(flown(3), 0.006), with_alpha(flown(4), 0.018)]), "alpha_bias")
+    records = [with_alpha(flown(seed).slice(0.0, 32.0), bias) for seed, bias in ((3, 0.006), (4, 0.018))]
+    entry = told(diagnose(records), "alpha_bias")
     assert (entry["scope"], entry["history"]) == (BY_RECORD, None)
     assert {s["record"] for s in entry["sizes"]} == {0, 1}
     assert all(s["low95"] - 1e-3 < (0.006, 0.018)[s["record"]] < s["high95"] + 1e-3 for s in entry["sizes"])
