@@ -25,6 +25,7 @@ from sim2real.reconstruct import Reconstruction
 # knows are white, means over 100 samples and over whole records included (`tests/test_whiteness.py`).
 WALK = {"u": 3e-3, "v": 3e-3, "w": 3e-3, "p": 3e-5, "q": 3e-5, "r": 3e-5, "altitude": 5e-3, "phi": 4e-5, "theta": 4e-5}
 WALK_OF_GUST = {"q": 2.5e-4, "phi": 5e-5, "theta": 5e-5}
+INPUTS = dict.fromkeys(SURFACES, 1e-3) | {"power_left": 1e3, "power_right": 1e3}  # steps for slopes, rad and W
 TRANSIENT = 10.0  # s with gains of their own after the start
 SPAN = 1.0  # s along a record that are flown as if at one condition
 ROUGH = 60  # steps after which a gust no longer shows in third differences
@@ -57,7 +58,7 @@ class Gain:
 
 def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),)) -> tuple[FloatArray, FloatArray,
                                                                                         FloatArray]:
-    """A, C of the one-step map about the record's typical state in each span, and B for a step of each surface [rad].
+    """A, C of the one-step map about the record's typical state in each span, and B for a step of each of INPUTS.
 
     z' = A z, y' = C z with y' all readings at the end of the step; the first axis goes over the spans.
     """
@@ -65,22 +66,23 @@ def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),)) -
     size[[TANGENT.index(n) for n in ("u", "v", "w", "altitude", "pitot")]] = 1e-2
     size[[i for i, n in enumerate(TANGENT) if n.startswith(("dryden", "gust"))]] = 1e-2
     n, m = len(TANGENT), len(spans)
-    each = 2 * n + 7
+    each = 2 * n + 2 * len(INPUTS) + 1
     flown = Predictor(flight, np.repeat(flight.parameters, m * each))
     flown.place_in(spans, each)
     change = np.zeros((each, n))
     change[:n], change[n : 2 * n] = np.diag(size), -np.diag(size)
     flown.correct(np.tile(change, (m, 1)))
-    for j, surface in enumerate(SURFACES):
-        flown.fleet.state[surface][2 * n + 2 * j :: each] += 1e-3
-        flown.fleet.state[surface][2 * n + 2 * j + 1 :: each] -= 1e-3
+    for j, (name, step) in enumerate(INPUTS.items()):
+        flown.fleet.state[name][2 * n + 2 * j :: each] += step
+        flown.fleet.state[name][2 * n + 2 * j + 1 :: each] -= step
     for surface in SURFACES:
         flown.fleet.command[surface] = flown.fleet.state[surface]
     flown.fleet.step()
     y, z = flown.read().reshape(m, each, -1), flown.tangent().reshape(m, each, -1)
     A = np.swapaxes((z[:, :n] - z[:, n : 2 * n]) / (2.0 * size[:, None]), 1, 2)
     C = np.swapaxes((y[:, :n] - y[:, n : 2 * n]) / (2.0 * size[:, None]), 1, 2)
-    B = np.stack([(z[:, 2 * n + 2 * j] - z[:, 2 * n + 2 * j + 1]) / 2e-3 for j in range(3)], axis=2)
+    B = np.stack([(z[:, 2 * n + 2 * j] - z[:, 2 * n + 2 * j + 1]) / (2.0 * step)
+                  for j, step in enumerate(INPUTS.values())], axis=2)  # fmt: skip
     return A, C, B
 
 
@@ -141,7 +143,8 @@ def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, 
     least = np.array([NOISE_FLOOR[name] for name in MEASURED[:FED_BACK]])
     columns = [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
     G, D = A[:, columns], C[:, columns]
-    Q = G @ Qw @ G.T + np.diag(walk**2 * flight.dt) + (B * flight.surface_noise**2) @ B.T + _within_steps(A, Qw)
+    driven = np.concatenate([flight.surface_noise, flight.power_noise])
+    Q = G @ Qw @ G.T + np.diag(walk**2 * flight.dt) + (B * driven**2) @ B.T + _within_steps(A, Qw)
     R = np.diag(np.where(blank, 1e6, np.maximum(noise, least**2) / rate))
     return A, C, Q, D @ Qw @ D.T + R, G @ Qw @ D.T
 

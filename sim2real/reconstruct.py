@@ -65,6 +65,7 @@ class Reconstruction:
         known: accelerations (m/s2 along x, y, z, rad/s2 about them) that the model is given beside its own [N, 6]: what
             another simulator has and ours has not (`sim2real.rollout`).
         surface_noise: standard deviation of the SURFACES in `controls` [3], rad, sample by sample.
+        power_noise: the same of the powers left and right [2], W: of white noise that moves the aircraft as much.
         about: the condition, by quantity, that generic terms count deviations from; the record's medians if left out.
         reach: root mean square of the generic terms' time courses, by name, where above one.
         inadequacy: of the model.
@@ -85,6 +86,7 @@ class Reconstruction:
     notes: tuple[str, ...]
     known: FloatArray | None = None
     surface_noise: FloatArray = field(default_factory=lambda: np.full(len(SURFACES), SURFACE_NOISE))
+    power_noise: FloatArray = field(default_factory=lambda: np.zeros(2))
     about: dict[str, float] = field(default_factory=dict)
     reach: dict[str, float] = field(default_factory=dict)
     inadequacy: Inadequacy = Inadequacy()
@@ -145,8 +147,10 @@ def reconstruct(record: FlightRecord, base: NDArray | None = None) -> Reconstruc
     for name in MEASURED[-2:]:
         if source != "torque":
             measured[:, MEASURED.index(name)] = np.nan  # it drives the simulation: nothing is left to compare
+    shaking = np.array([_step_noise(powers[f"power_{side}"], _sampled(record, f"{source}_{side}", at, dt))
+                        for side in ("left", "right")])
     return Reconstruction(record.meta.name, record, time, dt, measured, controls, positions, commands, row, altitude,
-                          source, _noise(measured), tuple(notes))
+                          source, _noise(measured), tuple(notes), power_noise=shaking)
 
 
 def _unrecorded(values: dict[str, FloatArray], record: FlightRecord) -> list[DataProblem]:
@@ -253,11 +257,24 @@ def _noise(measured: FloatArray) -> FloatArray:
     """Noise of each channel from its third differences (their variance is 20 times that of white noise), robustly."""
     out = np.array([NOISE_FLOOR[name] for name in MEASURED])
     for j in range(measured.shape[1]):
-        samples = measured[np.isfinite(measured[:, j]), j]
-        if len(samples) > 20:
-            spread = 1.4826 * float(np.median(np.abs(np.diff(samples, 3)))) / math.sqrt(20.0)
-            out[j] = max(out[j], spread)
+        out[j] = max(out[j], _white(measured[np.isfinite(measured[:, j]), j]))
     return out
+
+
+def _white(samples: FloatArray) -> float:
+    """Standard deviation of the white noise in samples; zero of too few."""
+    if len(samples) <= 20:
+        return 0.0
+    return 1.4826 * float(np.median(np.abs(np.diff(samples, 3)))) / math.sqrt(20.0)
+
+
+def _step_noise(values: FloatArray, sampled: NDArray[np.bool_]) -> float:
+    """Standard deviation of the white noise, a draw a step, whose sum over many steps is that of noisy `values`.
+
+    Between samples, every so many steps, they are straight lines.
+    """
+    samples = values[sampled]
+    return _white(samples) * math.sqrt(len(values) / max(len(samples), 1))
 
 
 def with_parameters(flight: Reconstruction, row: NDArray) -> Reconstruction:

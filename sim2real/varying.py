@@ -1,9 +1,10 @@
 """A gap that no one size of any effect explains: an effect whose size is another elsewhere, or changes in time.
 
 Ice that grows, or a bias that wanders, is something unknown to all that has one size, and the same generic terms in
-time may follow it. Where something unknown alone is likeliest, every effect that enters where it does is flown with a
-size for each stretch of every record; their departures from a common size are Gaussian (see `sim2real.by_stretch`), and
-what so many numbers take by luck they pay for.
+time may follow it. Where something unknown is likeliest, alone or beside one effect, that one and every other that
+enters where it does are flown with a size for each stretch of every record; their departures from a common size are
+Gaussian (see `sim2real.by_stretch`), and what so many numbers take by luck they pay for. Where a second one so varying
+says it as well, no effect is told by it: what is known is that something there varies in time, and that is unknown.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ class _Fit:
 
 def varying(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
             posterior: Posterior, centre: FloatArray) -> Posterior:  # fmt: skip
-    """The posterior with effects of varying size where something unknown alone is likeliest.
+    """The posterior with effects of varying size where something unknown is likeliest, alone or beside one effect.
 
     Args:
         flights: the diagnosed records about the baseline.
@@ -62,13 +63,13 @@ def varying(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
         centre: nuisances [n] that the variants were flown about.
     """
     best = posterior.best
-    if best.unknown is None or best.effects:
+    if best.unknown is None or len(best.effects) > 1:
         return posterior
     cuts = [cut_up(flight) for flight in flights]
     if len(tried := ways(flights, cuts)[1:]) == 0:  # one short record
         return posterior
-    home = [f for f in unbroken(candidates.families)
-            if best.unknown.component in f.effect.enters_at and f.effect.name in posterior.fits]
+    home = [f for f in unbroken(candidates.families) if f.effect.name in posterior.fits
+            and (best.unknown.component in f.effect.enters_at or f.effect.name in best.effects)]
     flying = _Flying(flights, candidates, evidences, baseline, posterior.tempering, cuts, tried)
     found = [(f, flying.fitted(f, centre)) for f in home]
     nothing = float(posterior.reduced[0, 0])
@@ -77,15 +78,25 @@ def varying(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
     single = max((h.log_prior for h in posterior.hypotheses if len(h.effects) == 1), default=-np.inf)
     told = {h.effects: h for h in posterior.hypotheses if h.unknown is None}
     settled = dict[tuple[str, ...], FloatArray]()
+    worth = list[float]()
     for family, fit in found:
         own = told.get((family.effect.name,))
         log = fit.log + 0.5 * nothing
         varied = Hypothesis(_set_fit(candidates, family, fit, log), None, single + float(np.log(VARIES)), log,
                             regained=forgiven(fit.left - least, nothing - fit.left))  # fmt: skip
+        worth.append(varied.log_evidence + varied.regained)
         if own is None or varied.log_posterior > own.log_posterior:
             told[varied.effects], settled[varied.effects] = varied, fit.nuisances
-    out = normalised([*told.values(), *(h for h in posterior.hypotheses if h.unknown is not None)], 0.0)
+    others = [_or_any(h, worth) if h is best else h for h in posterior.hypotheses if h.unknown is not None]
+    out = normalised([*told.values(), *others], 0.0)
     return replace(posterior, hypotheses=out, settled=settled.get(out[0].effects, posterior.settled))
+
+
+def _or_any(unknown: Hypothesis, worth: Sequence[float]) -> Hypothesis:
+    """Something unknown, as good as the second best of the effects that vary: `worth` of each, log evidence."""
+    if len(worth) < 2:
+        return unknown
+    return replace(unknown, log_evidence=max(unknown.log_evidence, sorted(worth)[-2] - unknown.regained))
 
 
 def _set_fit(candidates: Bank, family: Family, fit: _Fit, log: float) -> SetFit:

@@ -16,8 +16,11 @@ from sim2real.candidates import bank
 from sim2real.channels import MEASURED
 from sim2real.diagnosis import Diagnosis, diagnose
 from sim2real.evidence import gather
+from sim2real.hypotheses import Hypothesis
 from sim2real.predictor import Predictor, held
 from sim2real.reconstruct import reconstruct
+from sim2real.sets import SetFit
+from sim2real.varying import _or_any
 from sim2real.where import _variable
 from sim2real.words import sentences
 from testbed.flight import fly
@@ -47,8 +50,9 @@ def grown(name: str, parameter: str, size: Callable[[float], float]) -> FlightRe
         plant.fleet.parameters[:] = held(row, flight.dt)
         steps = min(each, len(flight.time) - 1 - k)
         read[k + 1 : k + 1 + steps] = plant.fly(steps, k)[:, 0]
-    noisy = {c: read[:, j] + flight.noise[j] * rng.standard_normal(len(read)) for j, c in enumerate(MEASURED[:12])}
-    return replace(record, channels=dict(record.channels) | {c: v for c, v in noisy.items() if c in record.channels})
+    noisy = {c: np.where(np.isfinite(record[c]), read[:, j] + flight.noise[j] * rng.standard_normal(len(read)), np.nan)
+             for j, c in enumerate(MEASURED) if c in record.channels}
+    return replace(record, channels=dict(record.channels) | noisy)
 
 
 def told(found: Diagnosis, name: str) -> dict:
@@ -79,6 +83,19 @@ def test_ice_that_grows_is_told_as_it_grew():
         assert stretch["start"] < at < stretch["end"]
         assert size == pytest.approx(eta(at), abs=0.04)
     assert "changing in time: 0.0" in sentences(found)[0]
+
+
+def test_a_moment_that_varies_is_unknown_where_many_effects_would_say_it():
+    """Of varying size, a trim, a centre of gravity and the power's moment all follow it."""
+    found = diagnose([grown("pitch_trim", "delta_Cm_0", lambda time: 0.0012 + 0.0008 * np.sin(0.3 * time))])
+    assert found.verdict == "unknown"
+    assert found.unknown is not None and found.unknown["component"] == "pitching_moment"
+
+
+@pytest.mark.parametrize("worth, expected", [([], 7.0), ([50.0], 7.0), ([50.0, 3.0], 7.0), ([50.0, 49.0, 2.0], 49.0)])
+def test_an_effect_that_varies_has_to_beat_the_next_before_the_unknown_gives_way(worth, expected):
+    told = _or_any(Hypothesis(SetFit(), None, -3.5, 6.0, regained=1.0), worth)
+    assert told.log_evidence + told.regained == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("name, parameter, size", [

@@ -6,6 +6,8 @@ the predictor has.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,8 +17,8 @@ from sim2real.channels import MEASURED
 from sim2real.diagnosis import _reconstructed
 from sim2real.evidence import SETTLE, SIGMAS, whiten, whitening
 from sim2real.kalman import _within_steps, follow, gains, gust_noise, linearise
-from sim2real.predictor import TANGENT, innovations
-from sim2real.reconstruct import Reconstruction
+from sim2real.predictor import TANGENT, Predictor, innovations
+from sim2real.reconstruct import Reconstruction, _step_noise
 from sim2real.references import Baseline
 from testbed.withheld import instruments
 from testbed.withheld import plant as pl
@@ -26,6 +28,7 @@ from testbed.withheld.manoeuvres import PLANS
 
 SEEDS, LEVEL, BLOCK = 6, 0.5, 100
 FELT = MEASURED[:11]
+RATES = [MEASURED.index(name) for name in ("p", "q", "r")]
 
 
 def flown(folder, sigma: float, seed: int) -> Reconstruction:
@@ -64,3 +67,30 @@ def test_gusts_between_samples_disturb_as_much_as_flights_show(tmp_path):
         apart = float(np.std(np.diff(one[:, column] - other[:, column])))
         j = TANGENT.index(name)
         assert apart == pytest.approx(np.sqrt(expected[j, j]), rel=0.3), name
+
+
+def test_noise_of_recorded_torque_disturbs_as_much_as_flights_show(tmp_path):
+    """Samples come every tenth of a second, straight lines between them; each engine has its own."""
+    flight, rng, steps = flown(tmp_path, 0.0, 0), np.random.default_rng(2), 200
+    every, spread = round(0.1 / flight.dt), 1200.0
+    at = np.arange(len(flight.time))
+
+    def rates(noise: dict[str, np.ndarray]) -> np.ndarray:
+        plant = Predictor(replace(flight, controls=flight.controls | noise), flight.parameters)
+        plant.place(0)
+        return plant.fly(steps)[-1, 0, RATES]
+
+    exact, apart = rates({}), []
+    for _ in range(300):
+        drawn = {name: rng.normal(0.0, spread, len(at[::every])) for name in ("power_left", "power_right")}
+        noise = {name: np.interp(at, at[::every], draws) for name, draws in drawn.items()}
+        apart.append(rates({name: flight.controls[name] + noise[name] for name in noise}) - exact)
+    told = _step_noise(noise["power_left"], at % every == 0)
+    assert told == pytest.approx(spread * np.sqrt(every), rel=0.25)
+    A, _, B = (matrix[0] for matrix in linearise(flight, [slice(0, steps)]))
+    covariance = np.zeros_like(A)
+    for _ in range(steps):
+        covariance = A @ covariance @ A.T + every * spread**2 * B[:, 3:] @ B[:, 3:].T
+    expected = np.sqrt(covariance.diagonal()[[TANGENT.index(name) for name in ("p", "q", "r")]])
+    assert np.std(apart, axis=0) == pytest.approx(expected, rel=0.25)
+    assert flight.power_noise == pytest.approx(LEVEL * 3.0 * 2000.0 * np.pi / 30.0 * np.sqrt(every), rel=0.5)
