@@ -51,6 +51,11 @@ def test_a_record_with_an_effect_of_ones_own_is_diagnosed_as_that_effect(tmp_pat
     assert told["hypotheses"][0]["effects"] == ["wing_camera"]
     assert told["effects"][0]["parameters"]["drag"]["estimate"] == pytest.approx(DRAG, rel=0.15)
     assert "wing_camera" in told["detection_limits"]
+    del LIBRARY["wing_camera"]
+    assert _run(["diagnose", str(path), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["verdict"] != "no_gap"
+    assert all("wing_camera" not in h["effects"] for h in told["hypotheses"])
 
 
 def test_the_command_line_flies_and_lists_it(tmp_path, capsys):

@@ -93,4 +93,4 @@ def test_noise_of_recorded_torque_disturbs_as_much_as_flights_show(tmp_path):
         covariance = A @ covariance @ A.T + every * spread**2 * B[:, 3:] @ B[:, 3:].T
     expected = np.sqrt(covariance.diagonal()[[TANGENT.index(name) for name in ("p", "q", "r")]])
     assert np.std(apart, axis=0) == pytest.approx(expected, rel=0.25)
-    assert flight.power_noise == pytest.approx(LEVEL * 3.0 * 2000.0 * np.pi / 30.0 * np.sqrt(every), rel=0.5)
+    assert flight.power_noise == pytest.approx(LEVEL * 3.0 * 2000.0 * np.pi / 30.0 * np.sqrt(every), rel=0.15)
