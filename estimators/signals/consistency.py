@@ -21,6 +21,7 @@ def factors(
     good: NDArray[np.bool_],
     lively: float,
     explained: float,
+    nuisance: FloatArray | None = None,
 ) -> list[tuple[float, bool]] | None:
     """Factor of each term in a change, and whether it stands clear of 1 and of 0.
 
@@ -30,17 +31,20 @@ def factors(
         good: rows to use (N,).
         lively: rms of the change below which nothing can be said.
         explained: R2 below which nothing can be said.
+        nuisance: a term (N,) whose factor is fitted and of no interest.
 
     Returns:
         (factor, clear) of each term, with errors for coloured residuals; None where nothing can be said.
     """
+    count = len(terms)
+    terms = terms if nuisance is None else [*terms, nuisance]
     rows = good & np.isfinite(change) & np.isfinite(np.sum(terms, axis=0))
     if rows.sum() < FEWEST or np.std(change[rows]) < lively:
         return None
     fit = least_squares(np.column_stack([*(term[rows] for term in terms), np.ones(rows.sum())]), change[rows])
     if fit.r2 < explained or not fit.full_rank:
         return None
-    pairs = zip(fit.theta[:-1], fit.std_error[:-1], strict=True)
+    pairs = zip(fit.theta[:count], fit.std_error[:count], strict=True)
     return [(float(k), abs(k - 1.0) > CLEAR * error and abs(k) > CLEAR * error) for k, error in pairs]
 
 

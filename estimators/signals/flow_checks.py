@@ -27,7 +27,6 @@ EXPLAINED, CALM = 0.3, 0.93  # R2 from which the motion makes the flow's change,
 SIDE = 0.35  # of a unit's ratio: beyond it an attitude that errs explains the factor of ay as well
 IN_DEGREES = 0.4  # growth of lift by itself per unit of alpha
 FEET = 0.4  # side force per beta over lift per alpha: 0.07 (light aircraft) to 0.34 (fighters), 0.14 to 0.2 here
-METRES = 0.3  # the same ratio below which ay is not in feet, whatever the flow says: there it would be 0.46 and more
 FEEBLE = 0.25  # rad/s2 per rad of a surface: 4 to 16 on these aircraft
 DEGREES = 180.0 / np.pi
 CONTROLS = {"elevator": ("q", ("alpha", "q")), "aileron": ("p", ("beta", "p", "r", "rudder")),
@@ -106,7 +105,8 @@ def _speed_unit(factor: float, calm: bool) -> str:
 def _check_beta(where: str, grid: Grid, v: Mapping[str, FloatArray]) -> set[str]:
     """V beta' = p alpha V - r V + ay + g cos(theta) sin(phi), and a side force against beta: beta, r, ay, airspeed.
 
-    The factor of ay is judged in calm air only: gusts from the side make it with beta, and bend it.
+    The factor of ay is judged in calm air only: gusts from the side make it with beta, and bend it. A vane that is late
+    lacks a part of beta's second derivative, fitted too, which goes as ay does: 20 ms would make its factor 0.7.
     """
     names = ("airspeed", "beta", "r", "p", "ay", "phi")
     if not all(name in grid.values for name in names):
@@ -116,10 +116,10 @@ def _check_beta(where: str, grid: Grid, v: Mapping[str, FloatArray]) -> set[str]
     gravity = smooth(G0 * np.cos(v["theta"]) * np.sin(v["phi"]), half)
     change = smooth(speed, half) * slope(grid.values["beta"], grid.dt, half) - roll
     terms = [smooth(-v["r"] * speed, half), smooth(grid.values["ay"], half), gravity]
-    whole = _whole(good, half)
-    found = factors(change, terms, whole, LIVELY, EXPLAINED)
+    whole, later = _whole(good, half), slope(change, grid.dt, half)
+    found = factors(change, terms, whole, LIVELY, EXPLAINED, later)
     (turn, clear), (side, clear_side), (bank, clear_bank) = found or [(1.0, False)] * 3
-    calm = factors(change, terms, whole, LIVELY, CALM) is not None
+    calm = factors(change, terms, whole, LIVELY, CALM, later) is not None
     force, match = line(grid.values["beta"][good], grid.values["ay"][good] / speed[good] ** 2)
     if clear and min(turn, bank) > 0.3 * DEGREES:
         raise InputError(f"{where}: column 'beta' looks like degrees: it changes at {turn:.3g} of r")
@@ -132,24 +132,21 @@ def _check_beta(where: str, grid: Grid, v: Mapping[str, FloatArray]) -> set[str]
         name = "'ay'" if clear or (found is not None and abs(turn - 1.0) < 0.3) else "'ay' (or 'beta')"
         raise InputError(f"{where}: column {name} has its sign reversed: the side force goes with beta, not against it")
     share = _side_share(grid, force, match)
-    if calm and abs(turn - 1.0) < 0.3:
-        _check_calm_side(where, side if clear_side else 1.0, bank if clear_bank else 1.0, share)
-        return {"beta", "r", "airspeed", "ay"} if clear_side or abs(side - 1.0) < 0.5 else {"beta", "r"}
-    return _check_ay_unit(where, share)
+    if not calm or abs(turn - 1.0) >= 0.3:
+        return _check_ay_unit(where, share)
+    _check_calm_side(where, side if clear_side else 1.0, bank if clear_bank else 1.0)
+    if clear_side or abs(side - 1.0) < 0.5:
+        return {"beta", "r", "airspeed", "ay"}
+    return {"beta", "r"} | _check_ay_unit(where, share)
 
 
-def _check_calm_side(where: str, side: float, bank: float, share: float | None = None) -> None:
-    """Units that the factors of ay and of gravity betray in calm air: both of airspeed, one of ay.
-
-    A factor near that of feet is not enough where the side force itself is known (`share`) and is that of metres.
-    """
+def _check_calm_side(where: str, side: float, bank: float) -> None:
+    """Units that the factors of ay and of gravity betray in calm air: both of airspeed, one of ay."""
     unit = _speed_unit(bank, True)
     if unit and side > 1.2:
         raise InputError(f"{where}: column 'airspeed' looks like {unit}: bank turns the flow {bank:.2f} times "
                          "too little")  # fmt: skip
     unit = nearest_unit(side, {"g": G0, "ft/s2": 0.3048}, SIDE)
-    if unit == "ft/s2" and share is not None and share < METRES:
-        return
     if unit and 0.7 < bank < 1.4:
         raise InputError(f"{where}: column 'ay' looks like {unit}: beta changes at {side:.2g} of it")
 
