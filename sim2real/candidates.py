@@ -24,7 +24,7 @@ from sim2real.terms import BEYOND, GENERIC, Term
 # The published sets of derivatives differ by about 5 % where they are well identified: the standard deviation of the
 # model's own uncertainty. A record's mass is known to about 1 % (assumed).
 SPREAD, MASS_SPREAD = 0.05, 0.01
-THRUST_SPREAD = 0.3  # of thrust that was not recorded and is balanced against the model's own drag (assumed)
+THRUST_SPREAD = 0.3  # of power that was not recorded and is told by the levers (assumed)
 FILTER_SPREAD, VANE_SPREAD = 0.1, 0.005  # of the recording's cut-off, and s: channels are in step to a few ms (assumed)
 VANE_SCALE = 0.015  # of a flow vane's reading, upwash included (assumed)
 LEAST = 0.1  # of a published value: a filter or a thrust with another sign does not fly
@@ -92,7 +92,7 @@ class Bank:
 def nuisances() -> tuple[Nuisance, ...]:
     """Derivatives by `SPREAD`, mass, the vanes' scales, the timing of channels, guessed thrust."""
     derivatives = [Nuisance(name, name, SPREAD) for name in DERIVATIVE_NAMES]
-    guessed = Nuisance("thrust", "thrust_factor_left+thrust_factor_right", THRUST_SPREAD, only="balance")
+    guessed = Nuisance("thrust", "thrust_factor_left+thrust_factor_right", THRUST_SPREAD, only="throttle")
     timing = (Nuisance("filter_frequency", "filter_frequency", FILTER_SPREAD),
               Nuisance("vane_lag", "vane_lag", VANE_SPREAD, True))
     vanes = [Nuisance(f"scale_{c}", f"scale_{c}", VANE_SCALE, True, follows=False) for c in ("alpha", "beta")]
@@ -175,6 +175,7 @@ def not_testable(flight_list: list[Reconstruction], candidates: Bank) -> dict[st
     commands = {name for flight in flight_list for name in flight.commands}
     has_beta = any(flight.has("beta") and flight.has("p") and flight.has("r") for flight in flight_list)
     torque = any(flight.power_from == "torque" for flight in flight_list)
+    balanced = all(flight.power_from == "balance" for flight in flight_list)
     for family in candidates.families:
         effect = family.effect
         for surface in SURFACES:
@@ -182,6 +183,8 @@ def not_testable(flight_list: list[Reconstruction], candidates: Bank) -> dict[st
                 out[effect.name] = f"needs {surface}_command: positions alone do not show how it follows"
         if effect.name == "spool_lag" and not (torque and "throttle_left" in commands):
             out[effect.name] = "needs torque and throttle"
+        if balanced and set(effect.enters_at) in ({"x_force"}, {"propulsion"}, {"sensor:ax"}):
+            out[effect.name] = "needs thrust, torque or levers: the axial acceleration stands for them"
         lateral = {"y_force", "rolling_moment", "yawing_moment", *(f"sensor:{c}" for c in LATERAL)}
         enters = set(effect.enters_at)
         if not has_beta and enters <= lateral | {"mass", "propulsion"} and enters & lateral:

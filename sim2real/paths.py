@@ -20,6 +20,7 @@ from icing_env.jit import entry
 from icing_env.propulsion import power_available
 from icing_env.record import FloatArray
 from sim2real.channels import SURFACES
+from sim2real.noise import white
 from sim2real.reconstruct import Reconstruction
 from sim2real.terms import Term, path_course
 
@@ -55,7 +56,7 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
             own = [term for term in terms if term.component == name.replace("command", "path")]
             added = [predicted[:, 0] + path_course(flight, predicted[:, 0], term.name) for term in own]
             # of the record alone: what noise is believed must not depend on the row that stands first
-            noise = np.hypot(max(POSITION_NOISE, spread(measured)), TIMING * np.gradient(whole, flight.dt))
+            noise = np.hypot(max(POSITION_NOISE, white(measured)), TIMING * np.gradient(whole, flight.dt))
             noise *= _weight(flight)
             left = (measured[:, None] - np.column_stack([predicted, *added])) / noise[:, None]
             out.append((f"{surface}_path", np.where(good[:, None], left, 0.0), rows + [term.row for term in own]))
@@ -216,10 +217,3 @@ def _weight(flight: Reconstruction) -> float:
 def _without_line(left: FloatArray, lever: FloatArray) -> FloatArray:
     base = np.column_stack([np.ones(len(lever)), lever])
     return left - base @ np.linalg.lstsq(base, left, rcond=None)[0]
-
-
-def spread(values: FloatArray) -> float:
-    """Noise of a smooth series, from its third differences (their variance is 20 times that of white noise)."""
-    third = np.diff(values, 3)
-    third = third[np.isfinite(third)]
-    return 1.4826 * float(np.median(np.abs(third))) / np.sqrt(20.0) if len(third) else 0.0

@@ -1,8 +1,7 @@
 """A flight record as what a simulation needs: time steps, controls, air, start, and measurements to compare with.
 
-Surfaces are the recorded positions. Power comes from torque where recorded, else from thrust through the propeller
-chart, else from the levers, else it is the constant that balances the axial acceleration of the first second. Every
-choice that had to be made is kept in `notes`.
+Surfaces are the recorded positions; where powers come from stands in `powers.py`. Every choice that had to be made is
+kept in `notes`.
 """
 
 from __future__ import annotations
@@ -16,11 +15,12 @@ from numpy.typing import NDArray
 from estimators.signals.data_checks import check
 from estimators.signals.resample import common_grid
 from icing_env import aircraft
-from icing_env.atmosphere import density, pressure, static_air
+from icing_env.atmosphere import density, static_air
 from icing_env.errors import InputError
-from icing_env.propulsion import power_available
 from icing_env.record import DataProblem, FlightRecord, FloatArray
 from sim2real.channels import LATERAL, MEASURED, NOISE_FLOOR, SURFACE_NOISE, SURFACES
+from sim2real.noise import step_noise, white
+from sim2real.powers import powers
 
 LONGEST_STEP, SHORTEST_STEP = 0.1, 0.018  # s: records are 10 to 200 Hz; faster ones are thinned to about 50 Hz
 LONGITUDINAL = ("airspeed", "alpha", "q", "theta", "ax", "az", "elevator")
@@ -140,15 +140,18 @@ def reconstruct(record: FlightRecord, base: NDArray | None = None) -> Reconstruc
     positions = {n: np.where(_sampled(record, n, at, dt), v, np.nan) if n in values else v for n, v in moved.items()}
     controls["flap"] = values.get("flap", np.zeros(len(time)))
     notes.extend(f"{n} not recorded: taken as zero" for n in SURFACES if n not in values)
-    source, powers = _powers(row, values, altitude, notes)
-    controls |= powers
+    source, driving = powers(row, values, altitude, dt, notes)
+    controls |= driving
     names = [*(f"{s}_command" for s in SURFACES), "throttle_left", "throttle_right"]
     commands = {n: values[n] for n in names if n in values}
     for name in MEASURED[-2:]:
         if source != "torque":
             measured[:, MEASURED.index(name)] = np.nan  # it drives the simulation: nothing is left to compare
-    shaking = np.array([_step_noise(powers[f"power_{side}"], _sampled(record, f"{source}_{side}", at, dt))
+    shaking = np.array([step_noise(driving[f"power_{side}"],
+                                   _sampled(record, "ax" if source == "balance" else f"{source}_{side}", at, dt))
                         for side in ("left", "right")])
+    if source == "balance":
+        measured[:, MEASURED.index("ax")] = np.nan  # so does it
     return Reconstruction(record.meta.name, record, time, dt, measured, controls, positions, commands, row, altitude,
                           source, _noise(measured), tuple(notes), power_noise=shaking)
 
@@ -219,32 +222,6 @@ def _air(row: NDArray, values: dict[str, FloatArray], notes: list[str]) -> Float
     return np.full(n, 2200.0)
 
 
-def _powers(row: NDArray, values: dict[str, FloatArray], altitude: FloatArray,
-            notes: list[str]) -> tuple[str, dict[str, FloatArray]]:
-    """Shaft powers [W] that drive the engines, and where they come from."""
-    p = row[0]
-    forward = values["airspeed"] * np.cos(values["alpha"])
-    per_power = p["propeller_efficiency"] / np.sqrt(forward**2 + p["propeller_static_speed"] ** 2)
-    sides = ("left", "right")
-    if all(f"torque_{s}" in values for s in sides):
-        rpm = {s: values.get(f"rpm_{s}", np.full(len(altitude), p["propeller_rpm"])) for s in sides}
-        return "torque", {f"power_{s}": values[f"torque_{s}"] * rpm[s] * math.pi / 30.0 for s in sides}
-    if all(f"thrust_{s}" in values for s in sides):
-        notes.append("torque not recorded: power from the recorded thrust")
-        return "thrust", {f"power_{s}": values[f"thrust_{s}"] / per_power for s in sides}
-    if all(f"throttle_{s}" in values for s in sides):
-        notes.append("thrust and torque not recorded: power from the levers")
-        full = np.array([power_available(pressure(float(h)), p) for h in altitude])
-        return "throttle", {f"power_{s}": full * values[f"throttle_{s}"] for s in sides}
-    notes.append("thrust not recorded: the constant that balances the axial acceleration at the start")
-    first = slice(0, max(2, len(altitude) // 20))
-    qs = 0.5 * density(float(np.median(altitude))) * np.mean(values["airspeed"][first] ** 2) * p["wing_area"]
-    a = float(np.mean(values["alpha"][first]))
-    drag = -qs * (p["CX_0"] + p["CX_alpha"] * a + p["CX_alpha2"] * a * a)
-    thrust = max(p["mass"] * float(np.mean(values["ax"][first])) + drag, 0.0)
-    return "balance", {f"power_{s}": np.full(len(altitude), 0.5 * thrust / np.mean(per_power)) for s in sides}
-
-
 def unfiltered(values: FloatArray, frequency: float, dt: float) -> FloatArray:
     """Undo the first-order low pass of the recording (icing_env.sensors): noise grows by half."""
     share = 1.0 - math.exp(-2.0 * math.pi * frequency * dt)
@@ -257,24 +234,8 @@ def _noise(measured: FloatArray) -> FloatArray:
     """Noise of each channel from its third differences (their variance is 20 times that of white noise), robustly."""
     out = np.array([NOISE_FLOOR[name] for name in MEASURED])
     for j in range(measured.shape[1]):
-        out[j] = max(out[j], _white(measured[np.isfinite(measured[:, j]), j]))
+        out[j] = max(out[j], white(measured[np.isfinite(measured[:, j]), j]))
     return out
-
-
-def _white(samples: FloatArray) -> float:
-    """Standard deviation of the white noise in samples; zero of too few."""
-    if len(samples) <= 20:
-        return 0.0
-    return 1.4826 * float(np.median(np.abs(np.diff(samples, 3)))) / math.sqrt(20.0)
-
-
-def _step_noise(values: FloatArray, sampled: NDArray[np.bool_]) -> float:
-    """Standard deviation of the white noise, a draw a step, whose sum over many steps is that of noisy `values`.
-
-    Between samples, every so many steps, they are straight lines.
-    """
-    samples = values[sampled]
-    return _white(samples) * math.sqrt(len(values) / max(len(samples), 1))
 
 
 def with_parameters(flight: Reconstruction, row: NDArray) -> Reconstruction:

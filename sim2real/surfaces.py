@@ -18,7 +18,8 @@ from scipy.stats import chi2
 
 from icing_env.record import FloatArray
 from sim2real.channels import SURFACES
-from sim2real.paths import LAGS, UNFILTERED, follow, spread
+from sim2real.noise import white
+from sim2real.paths import LAGS, UNFILTERED, follow
 from sim2real.reconstruct import Reconstruction
 
 PLACED = 3e-5  # rad, what a fitted law leaves (assumed: a position's noise over the root of the samples behind a term)
@@ -79,11 +80,11 @@ def _law(flight: Reconstruction, command: FloatArray, surface: str) -> tuple[Flo
         return behind(published, filtered=False)[:, 0], EXACT
     every = behind(published).shape[1]
     laws = [(published, 0, 0), *((_lag(square, terms, published), terms, terms + 1) for terms in (0, 2, every))]
-    noise = max(spread(left(laws[-1][0], every)), 1e-9)
-    white = [law for law in laws if _white(left(*law[:2]))]
-    if not white:
+    noise = max(white(left(laws[-1][0], every)), 1e-9)
+    fitting = [law for law in laws if _nothing_else(left(*law[:2]))]
+    if not fitting:
         return None
-    lag, terms, _ = min(white, key=lambda law: square(*law[:2]) / noise**2 + law[2] * np.log(n))
+    lag, terms, _ = min(fitting, key=lambda law: square(*law[:2]) / noise**2 + law[2] * np.log(n))
     return np.asarray(behind(lag, filtered=False) @ weights(lag, terms)), PLACED if terms else EXACT
 
 
@@ -92,13 +93,13 @@ def _published(left: FloatArray, basis: FloatArray) -> bool:
 
     Another lag is to first order an advance.
     """
-    square, cost = max(spread(left), 1e-9) ** 2, np.log(len(left))
+    square, cost = max(white(left), 1e-9) ** 2, np.log(len(left))
 
     def gain(columns: FloatArray) -> float:
         fitted = columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
         return float(fitted @ fitted) / square
 
-    return _white(left) and gain(basis[:, RATE : RATE + 1]) < cost and gain(basis) < 3.0 * cost
+    return _nothing_else(left) and gain(basis[:, RATE : RATE + 1]) < cost and gain(basis) < 3.0 * cost
 
 
 def _lag(square: Callable[[float, int], float], terms: int, published: float) -> float:
@@ -117,9 +118,9 @@ def _basis(position: FloatArray) -> FloatArray:
     return np.column_stack([position, slow[:, 0], position**3, rate, np.gradient(rate), slow[:, 1:]])
 
 
-def _white(left: NDArray) -> bool:
+def _nothing_else(left: NDArray) -> bool:
     """Whether means over SCALES of samples are as small as the means of white noise."""
-    square = max(spread(left), 1e-9) ** 2
+    square = max(white(left), 1e-9) ** 2
     for m in SCALES:
         if (count := len(left) // m) == 0:
             continue  # a short record

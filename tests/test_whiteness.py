@@ -17,8 +17,9 @@ from sim2real.channels import MEASURED
 from sim2real.diagnosis import _reconstructed
 from sim2real.evidence import SETTLE, SIGMAS, whiten, whitening
 from sim2real.kalman import _within_steps, follow, gains, gust_noise, linearise
+from sim2real.noise import step_noise
 from sim2real.predictor import TANGENT, Predictor, innovations
-from sim2real.reconstruct import Reconstruction, _step_noise
+from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from testbed.withheld import instruments
 from testbed.withheld import plant as pl
@@ -85,7 +86,7 @@ def test_noise_of_recorded_torque_disturbs_as_much_as_flights_show(tmp_path):
         drawn = {name: rng.normal(0.0, spread, len(at[::every])) for name in ("power_left", "power_right")}
         noise = {name: np.interp(at, at[::every], draws) for name, draws in drawn.items()}
         apart.append(rates({name: flight.controls[name] + noise[name] for name in noise}) - exact)
-    told = _step_noise(noise["power_left"], at % every == 0)
+    told = step_noise(noise["power_left"], at % every == 0)
     assert told == pytest.approx(spread * np.sqrt(every), rel=0.25)
     A, _, B = (matrix[0] for matrix in linearise(flight, [slice(0, steps)]))
     covariance = np.zeros_like(A)
