@@ -24,7 +24,6 @@ from sim2real.hypotheses import P_NONE, P_UNKNOWN, Hypothesis, Posterior
 from sim2real.ladder import ladder
 from sim2real.limits import limits
 from sim2real.manoeuvre import next_manoeuvre
-from sim2real.paths import in_step
 from sim2real.reconstruct import Reconstruction, reconstruct
 from sim2real.references import Baseline, fit_baseline
 from sim2real.remedy import Remedy, leading, remedy, resimulation, values_of
@@ -33,6 +32,7 @@ from sim2real.side_by_side import algebra_in_one_thread, each
 from sim2real.singles import EffectFit
 from sim2real.surfaces import placed
 from sim2real.terms import in_common
+from sim2real.timing import in_step
 from sim2real.weigh import Progress, fit
 from sim2real.where import components, regimes
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 from scipy.signal import lfilter
 
 from icing_env.atmosphere import pressure
@@ -25,13 +26,11 @@ from sim2real.reconstruct import Reconstruction
 from sim2real.terms import Term, path_course
 
 POSITION_NOISE = 5.2e-4  # rad, the least believed (0.03 deg)
-TIMING = 0.002  # s: command and position are no better in step, nor is the actuator exactly of first order (assumed)
+AROUND = 5  # samples about one, where a command of doubtful timing moves
 CORRELATED = 0.5  # s in which errors of a position's calibration and timing stay what they are (assumed)
 POWER_NOISE = 0.01  # of full power
 PATHS = (*(f"{surface}_path" for surface in SURFACES), "propulsion")  # components; the last has more than its path
 ACTUATOR = ("lag", "rate", "min", "max", "gearing", "offset")
-LAGS = np.array([-0.03, -0.015, 0.0, 0.015, 0.03, 0.06, 0.1, 0.15, 0.22, 0.3, 0.5])  # s, beside the published one
-LATER = 12.0  # whitened square that commands taken one sample later have to be better by (assumed)
 UNFILTERED = 1e6  # Hz: no low pass
 STILL_COMMAND, STILL_LEVER = 1e-4, 1e-3  # rad, 0..1: a command that moves less tests nothing
 
@@ -51,16 +50,38 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
             measured, good = flight.positions[surface], np.isfinite(flight.positions[surface])
             if not good.any():
                 continue
-            whole = np.interp(flight.time, flight.time[good], measured[good])
             predicted = follow(flight.commands[name], measured[good][0], parameters[rows], surface, flight.dt)
             own = [term for term in terms if term.component == name.replace("command", "path")]
             added = [predicted[:, 0] + path_course(flight, predicted[:, 0], term.name) for term in own]
-            # of the record alone: what noise is believed must not depend on the row that stands first
-            noise = np.hypot(max(POSITION_NOISE, white(measured)), TIMING * np.gradient(whole, flight.dt))
-            noise *= _weight(flight)
-            left = (measured[:, None] - np.column_stack([predicted, *added])) / noise[:, None]
-            out.append((f"{surface}_path", np.where(good[:, None], left, 0.0), rows + [term.row for term in own]))
+            left = np.where(good[:, None], measured[:, None] - np.column_stack([predicted, *added]), 0.0)
+            out.append((f"{surface}_path", _believed(flight, surface, left), rows + [term.row for term in own]))
     return out + _engine_residuals(flight, parameters)
+
+
+def _believed(flight: Reconstruction, surface: str, left: FloatArray) -> FloatArray:
+    """What is left of a surface's positions [N, rows] over its noise: sample by sample, and a delay that lasts."""
+    noise = position_noise(flight, surface)[:, None]
+    delay = flight.timing * np.gradient(_whole(flight, surface), flight.dt)[:, None] / noise
+    delay *= np.any(left != 0.0, axis=1)[:, None]
+    square = float(np.sum(delay**2))
+    share = (1.0 - 1.0 / np.sqrt(1.0 + square)) / max(square, 1e-12)
+    return np.asarray(left / noise - share * delay * (delay.T @ (left / noise)))
+
+
+def _whole(flight: Reconstruction, surface: str) -> FloatArray:
+    """A recorded position, bridged where it was not [N]."""
+    good = np.isfinite(flight.positions[surface])
+    return np.interp(flight.time, flight.time[good], flight.positions[surface][good])
+
+
+def position_noise(flight: Reconstruction, surface: str) -> FloatArray:
+    """What a recorded position may be off its command's by [N], samples counted as if they were CORRELATED apart.
+
+    Of the record alone: what noise is believed must not depend on the row that stands first.
+    """
+    moving = maximum_filter1d(np.abs(np.gradient(_whole(flight, surface), flight.dt)), AROUND)
+    noise = np.hypot(max(POSITION_NOISE, white(flight.positions[surface])), flight.timing * moving)
+    return np.asarray(noise * _weight(flight))
 
 
 def of_paths(flight: Reconstruction, components: Collection[str]) -> Reconstruction:
@@ -94,38 +115,6 @@ def excess(flight: Reconstruction, parameters: NDArray) -> dict[str, float]:
 def counted(flight: Reconstruction, samples: int) -> int:
     """Samples of a path that count as if they were CORRELATED apart."""
     return round(samples * min(flight.dt / CORRELATED, 1.0))
-
-
-def in_step(flights: Sequence[Reconstruction]) -> list[Reconstruction]:
-    """Records with their commands one sample later, if positions follow them better so.
-
-    Whether a recorded command acts in the step that ends at its sample or in the one that begins there is a matter of
-    the recorder; taken the wrong way round, every actuator lags. Each way is judged at the lag that suits it best, and
-    every surface has to agree: one alone may have an effect.
-    """
-    later = [replace(f, commands={n: np.concatenate([c[:1], c[:-1]]) for n, c in f.commands.items()}) for f in flights]
-    better = _at_any_lag(flights) - _at_any_lag(later)
-    if np.sum(better) < LATER or np.min(better) < 0.0:
-        return list(flights)
-    return [replace(f, notes=(*f.notes, "commands taken one sample later: positions follow them better so"))
-            for f in later]
-
-
-def _at_any_lag(flights: Sequence[Reconstruction]) -> FloatArray:
-    """Whitened square of each surface's positions, with the lag that leaves least [3]; zero where nothing moved."""
-    total = np.zeros(len(SURFACES))
-    for j, surface in enumerate(SURFACES):
-        left = np.zeros(len(LAGS))
-        for flight in flights:
-            rows = np.repeat(flight.parameters, len(LAGS))
-            rows[f"{surface}_lag"] = np.maximum(rows[f"{surface}_lag"] + LAGS, 0.0)
-            only = replace(flight, commands={n: c for n, c in flight.commands.items() if n == f"{surface}_command"})
-            for _, residual, own in path_residuals(only, rows):
-                square = np.full(len(LAGS), np.sum(residual[:, 0] ** 2))
-                square[own] = np.sum(residual**2, axis=0)
-                left += square
-        total[j] = left.min()
-    return total
 
 
 def _differing(parameters: NDArray, names: list[str]) -> list[int]:

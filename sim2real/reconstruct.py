@@ -23,6 +23,7 @@ from sim2real.noise import step_noise, white
 from sim2real.powers import powers
 
 LONGEST_STEP, SHORTEST_STEP = 0.1, 0.018  # s: records are 10 to 200 Hz; faster ones are thinned to about 50 Hz
+TIMING = 0.002  # s: command and position are no better in step, nor is the actuator exactly of first order (assumed)
 LONGITUDINAL = ("airspeed", "alpha", "q", "theta", "ax", "az", "elevator")
 
 
@@ -69,6 +70,7 @@ class Reconstruction:
         about: the condition, by quantity, that generic terms count deviations from; the record's medians if left out.
         reach: root mean square of the generic terms' time courses, by name, where above one.
         inadequacy: of the model.
+        timing: s, how sharply it is known when commands act.
     """
 
     name: str
@@ -90,6 +92,7 @@ class Reconstruction:
     about: dict[str, float] = field(default_factory=dict)
     reach: dict[str, float] = field(default_factory=dict)
     inadequacy: Inadequacy = Inadequacy()
+    timing: float = TIMING
 
     def channel(self, name: str) -> FloatArray:
         """One column of `measured`, gaps filled by interpolation; zeros where it was not recorded."""

@@ -19,8 +19,9 @@ from scipy.stats import chi2
 from icing_env.record import FloatArray
 from sim2real.channels import SURFACES
 from sim2real.noise import white
-from sim2real.paths import LAGS, UNFILTERED, follow
+from sim2real.paths import UNFILTERED, follow
 from sim2real.reconstruct import Reconstruction
+from sim2real.timing import LAGS
 
 PLACED = 3e-5  # rad, what a fitted law leaves (assumed: a position's noise over the root of the samples behind a term)
 EXACT = 3e-6  # rad, the same of a law of which nothing but the lag is fitted (assumed)

@@ -16,10 +16,10 @@ from sim2real.candidates import bank, nodes, nuisances, unbroken
 from sim2real.channels import FED_BACK
 from sim2real.diagnosis import Diagnosis, credible, diagnose
 from sim2real.kalman import gains, linearise
-from sim2real.paths import in_step
 from sim2real.predictor import innovations
 from sim2real.reconstruct import reconstruct, unfiltered
 from sim2real.sizes import piece_prior, size_prior
+from sim2real.timing import in_step
 from testbed.cli import _run
 from testbed.commands.diagnose import answer
 from testbed.flight import fly
@@ -221,7 +221,7 @@ def test_commands_that_act_one_sample_later_are_put_in_step_and_one_lagging_surf
     early = replace(asked, commands={n: np.concatenate([c[1:], c[-1:]]) for n, c in asked.commands.items()})
     (found,) = in_step([early])
     assert found.commands["elevator_command"][2:-2] == pytest.approx(asked.commands["elevator_command"][2:-2])
-    assert any("one sample later" in note for note in found.notes)
+    assert any("1 samples later" in note for note in found.notes)
 
 
 def test_the_credible_set_is_the_smallest_that_holds_95_percent():

@@ -1,0 +1,59 @@
+"""What drives the model where engines were not recorded: levers behind the spool, or what the acceleration asks for."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from icing_env import scenario
+from icing_env.record import FlightRecord
+from sim2real.candidates import bank, not_testable
+from sim2real.channels import MEASURED
+from sim2real.diagnosis import diagnose
+from sim2real.reconstruct import reconstruct
+from testbed.flight import fly
+
+ENGINES = ("thrust", "torque", "rpm")
+
+
+@cache
+def flown(sigma: float = 0.0) -> FlightRecord:
+    """Doublets of all surfaces, levers moved by the autothrottle as speed wants it."""
+    chosen = scenario.load("clear_air", duration=52.0, parameters={"turbulence_sigma_w": sigma})
+    return fly(chosen, seed=2, observer=False, protection=False).record
+
+
+def without(record: FlightRecord, *names: str) -> FlightRecord:
+    return replace(record, channels={n: v for n, v in record.channels.items() if not n.startswith(names)})
+
+
+@pytest.mark.parametrize(("absent", "source", "within"), [
+    (("torque", "rpm"), "thrust", 0.02), (ENGINES, "throttle", 0.02), ((*ENGINES, "throttle"), "balance", 0.1),
+])  # fmt: skip
+def test_powers_are_those_of_the_torque_whatever_they_are_told_by(absent, source, within):
+    true = reconstruct(flown())
+    assert true.power_from == "torque"
+    flight = reconstruct(without(flown(), *absent))
+    assert flight.power_from == source
+    for side in ("left", "right"):
+        power, told = true.controls[f"power_{side}"], flight.controls[f"power_{side}"]
+        assert np.sqrt(np.mean((told - power) ** 2)) < within * np.mean(power)
+    assert any("not recorded" in note for note in flight.notes)
+
+
+def test_what_the_axial_acceleration_stands_for_is_compared_and_tested_no_more():
+    flight = reconstruct(without(flown(), *ENGINES, "throttle"))
+    assert not flight.has("ax")
+    assert np.isfinite(reconstruct(flown()).measured[:, MEASURED.index("ax")]).all()
+    why = not_testable([flight], bank())
+    for name in ("thrust_loss", "ice_drag", "drag_due_to_lift", "axial_accelerometer_bias"):
+        assert "axial acceleration" in why[name]
+    assert "asymmetric_thrust" not in why
+    assert "ice_drag" not in not_testable([flight, reconstruct(flown())], bank())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("absent", [ENGINES, (*ENGINES, "throttle")])
+def test_a_clean_aircraft_without_engine_channels_is_not_blamed(absent):
+    assert diagnose([without(flown(0.5), *absent)]).verdict == "no_gap"
