@@ -10,7 +10,8 @@ import pytest
 from testbed.withheld import draw, faults, generate, score
 
 N, DT = 2001, 0.02
-X = {name: np.sin(0.01 * np.arange(N)) + 2.0 for name in (*faults.EVERY, "altitude")}
+OTHERS = (*faults.SURFACES, *faults.ENGINES, *faults.LEVERS)
+X = {name: np.sin(0.01 * np.arange(N)) + 2.0 for name in (*faults.EVERY, "altitude", *OTHERS)}
 
 
 def test_every_kind_is_drawn_beside_the_set_and_the_set_stays_as_it_was():
@@ -23,7 +24,7 @@ def test_every_kind_is_drawn_beside_the_set_and_the_set_stays_as_it_was():
     assert len(draw.designs(150, 1)) == 150 and all(d.fault is None for d in draw.designs(150, 1))
 
 
-@pytest.mark.parametrize("kind", sorted(faults.KINDS))
+@pytest.mark.parametrize("kind", sorted(kind for kind, where in faults.KINDS.items() if "alpha" in where))
 def test_only_the_faulty_channel_is_touched_and_as_the_fault_says(kind):
     fault = draw.Fault(kind, "alpha", 5)
     found = faults.spoiled(X, fault, DT)
@@ -48,6 +49,22 @@ def test_only_the_faulty_channel_is_touched_and_as_the_fault_says(kind):
         assert share[0] <= known.mean() <= share[1]
         if kind == "slow":
             assert len(set(np.diff(np.flatnonzero(known)))) > 1  # at no constant rate
+
+
+def test_what_formats_allow_is_in_the_records_of_a_case_and_nothing_else():
+    late = faults.spoiled(X, draw.Fault("between", "commands", 5), DT)
+    assert {n for n in X if not np.array_equal(late[n], X[n])} == set(faults.SURFACES)
+    found, true = late["elevator_command"][5:-5], X["elevator_command"][5:-5]
+    samples = float(np.median((true - found) / np.gradient(true)))
+    assert faults.BETWEEN[0] < samples < faults.BETWEEN[1] and abs(samples) > 0.01
+    for kind, gone in (("engines", faults.ENGINES), ("powerless", (*faults.ENGINES, *faults.LEVERS))):
+        found = faults.spoiled(X, draw.Fault(kind, "engines", 5), DT)
+        assert {n for n in X if not np.isfinite(found[n]).any()} == set(gone)
+        assert all(np.array_equal(found[n], X[n]) for n in X if n not in gone)
+    design = draw.Design("faults", (), 0, 1.0, 0.5, 1.3, 1.0, {}, 7, fault=draw.Fault("powerless", "engines", 3))
+    header, first = generate.make_case("a", design, None)[0]["1.csv"].splitlines()[:2]
+    row = dict(zip(header.split(","), first.split(","), strict=True))
+    assert {n for n, cell in row.items() if cell == ""} == {*faults.ENGINES, *faults.LEVERS}
 
 
 def test_files_of_a_faulty_case_hold_the_fault_and_the_key_tells_it():
@@ -82,7 +99,8 @@ def answer(verdict: str, effects: list[str], *problems: tuple[str, str]) -> dict
     ("sign", answer("unknown", [], ("q", "sign reversed")), False),
     ("sign", {"error": "record 'a': q looks like deg/s"}, True),
     ("sign", {"error": "record 'a': quite unusable"}, False),
-    ("slow", answer("no_gap", []), True),
+    ("slow", answer("no_gap", []), True), ("between", answer("no_gap", []), True),
+    ("between", answer("explained", ["elevator_lag"]), False), ("powerless", answer("unknown", []), False),
     ("slow", {"error": "record 'a': q has too few samples"}, False),
 ])  # fmt: skip
 def test_right_is_named_and_nothing_blamed(kind, told, right):

@@ -1,7 +1,8 @@
 """What a recorder or whoever exported a record can do to it, one fault a case, the same in all of its records.
 
 Right is a diagnosis that names the channel among the record's problems (or refuses it by name) and blames nothing on
-the aircraft. A slow channel whose instants differ from the others' is no fault at all: formats allow it.
+the aircraft. Some are no fault at all, since formats allow them: a slow channel whose instants differ from the others',
+commands that the recorder has between its samples, engines that were not recorded (with levers, or without).
 """
 
 from __future__ import annotations
@@ -19,11 +20,16 @@ FORCES = ("ax", "ay", "az")
 EVERY = ("airspeed", *ANGLES, *FORCES)
 KINDS: dict[str, tuple[str, ...]] = {
     "sign": (*ANGLES, *FORCES), "unit": (*EVERY, "altitude"), "stuck": EVERY, "dropped": EVERY, "blank": EVERY,
-    "skew": EVERY, "slow": EVERY, "dropouts": EVERY}  # fmt: skip
+    "skew": EVERY, "slow": EVERY, "dropouts": EVERY, "between": ("commands",), "engines": ("engines",),
+    "powerless": ("engines",)}  # fmt: skip
+SURFACES = ("elevator_command", "aileron_command", "rudder_command")
+ENGINES = ("thrust_left", "thrust_right", "torque_left", "torque_right", "rpm_left", "rpm_right")
+LEVERS = ("throttle_left", "throttle_right")
 FACTORS = {"airspeed": 1.0 / 0.514444, "altitude": 1.0 / 0.3048, **dict.fromkeys(ANGLES, 180.0 / math.pi),
            **dict.fromkeys(FORCES, 1.0 / 9.80665)}  # knots, ft, deg, g
 MOST, SHARE = 60, 0.16  # cases: 24 beside 150, 60 beside 2,400
 STUCK, SKEW, PAUSE = (8.0, 20.0), (0.2, 0.4), (0.4, 1.5)  # s
+BETWEEN = (-1.5, 1.5)  # samples
 
 
 def fault_count(cases: int) -> int:
@@ -56,12 +62,19 @@ def spoiled(channels: dict[str, NDArray], fault: Fault, dt: float) -> dict[str, 
     """Channels of a record with the fault in; a dropped one is absent, blanks are nan.
 
     Args:
-        channels: by name, a value at every sample.
+        channels: by name, a value at every sample; commands too.
         fault: what is wrong.
         dt: s between samples.
     """
     rng = np.random.default_rng(np.random.SeedSequence([fault.seed]))
-    out, x = dict(channels), channels[fault.channel].copy()
+    out = dict(channels)
+    if fault.kind == "between":
+        late = float(rng.uniform(*BETWEEN))
+        return out | {name: _late(channels[name], late) for name in SURFACES}
+    if fault.kind in ("engines", "powerless"):
+        gone = ENGINES + (LEVERS if fault.kind == "powerless" else ())
+        return out | {name: np.full_like(channels[name], np.nan) for name in gone}
+    x = channels[fault.channel].copy()
     n = len(x)
     if fault.kind == "dropped":
         del out[fault.channel]
@@ -84,3 +97,9 @@ def spoiled(channels: dict[str, NDArray], fault: Fault, dt: float) -> dict[str, 
     else:
         raise ValueError(fault.kind)
     return out | {fault.channel: x}
+
+
+def _late(x: NDArray, samples: float) -> NDArray:
+    """What a recorder has that is so many samples late, in straight lines between its own."""
+    at = np.arange(len(x), dtype=np.float64)
+    return np.interp(at - samples, at, x)

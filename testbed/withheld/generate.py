@@ -153,8 +153,10 @@ def _flown(name: str, design: Design, parts: Parts,
     for i, manoeuvre in enumerate(PLANS[design.plan]):
         flown, read = recorded(aircraft, manoeuvre, design.gain, design.air, design.random(i))
         flights.append(held(flown, read))
-        seen = read if design.fault is None else spoiled(read, design.fault, DT)
-        texts[f"{i + 1}.csv"] = files.record_text(seen, flown.commands)
+        seen = read | dict(zip(files.COMMANDS, flown.commands.T, strict=True))
+        if design.fault is not None:
+            seen = spoiled(seen, design.fault, DT)
+        texts[f"{i + 1}.csv"] = files.record_text(seen, np.column_stack([seen[name] for name in files.COMMANDS]))
         texts[f"{i + 1}.toml"] = files.side_text(name, "diagnose" if i < DIAGNOSED else "held_out")
     closed = closures(design.baseline, parts, PLANS[design.plan][DIAGNOSED:], flights[DIAGNOSED:], design.gain,
                       design.air)

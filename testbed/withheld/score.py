@@ -20,7 +20,7 @@ import numpy as np
 
 DETECTABLE, APART, SAME = 6.0, 5.0, 3.5  # D to none; D beyond which a rival is another; D within which it is not
 BINS, LOWEST, HIGHEST = 15, 0.02, 0.98
-HARMLESS = ("slow",)  # a channel at another rate is allowed
+HARMLESS = ("slow", "between", "engines", "powerless")  # what formats allow
 Case = dict[str, Any]
 
 
