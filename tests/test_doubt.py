@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sim2real.candidates import bank
 from sim2real.generic import UnknownFit
-from sim2real.hypotheses import DOUBT, Hypothesis, doubted, normalised
+from sim2real.hypotheses import DOUBT, ELSEWHERE, Hypothesis, _leaking, doubted, normalised
 from sim2real.sets import SetFit
 
 SOMETHING = UnknownFit("x_force", 0.0, (("1", 1.0, 0.1),), 0.0, {})
@@ -41,3 +42,12 @@ def test_no_gap_is_not_doubted():
     found = normalised(some([0.5, 0.0, 1.0]), 0.0)
     assert found[0].unknown is None
     assert [h.probability for h in doubted(found)] == [h.probability for h in found]
+
+
+@given(st.floats(-5.0, 400.0))
+def test_something_unknown_beside_another_form_is_less_by_what_forms_leave_elsewhere(regained):
+    updraft, wing = (SetFit((next(f for f in bank().families if f.effect.name == n),)) for n in ("updraft", "wing_ice"))
+    found = [Hypothesis(updraft, None, -5.0, 100.0, regained=regained), Hypothesis(updraft, SOMETHING, -9.0, 140.0),
+             Hypothesis(wing, SOMETHING, -9.0, 50.0), Hypothesis(SetFit(), SOMETHING, -3.0, 80.0)]  # fmt: skip
+    less = [before.log_posterior - after.log_posterior for before, after in zip(found, _leaking(found), strict=True)]
+    assert less == pytest.approx([0.0, min(max(regained, 0.0), ELSEWHERE), 0.0, 0.0])
