@@ -23,7 +23,7 @@ SAME_PLACE = 0.02  # of that where two members are faults of one device: another
 # Of the probability, that the evidence misleads: of 46 answers of 0.9 and more to gaps of development, 38 were right.
 DOUBT = 0.14
 NEXT = 0.8  # of the doubt, that it is one of those ranked next, each half as likely as the one before (assumed)
-ELSEWHERE = 10.0  # log evidence that another form of an effect leaves elsewhere: 4 to 13 in three answers of one sealed set
+ELSEWHERE = 10.0  # log evidence that another form leaves at other places: 4 to 13 in three answers of a sealed set
 KEPT = 1e-5  # sets of several effects less probable than this are dropped
 
 
