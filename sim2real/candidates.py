@@ -90,7 +90,7 @@ class Bank:
 
 
 def nuisances() -> tuple[Nuisance, ...]:
-    """Derivatives by `SPREAD`, mass, the vanes' scales, the timing of channels, guessed thrust."""
+    """Derivatives by `SPREAD`, mass, the vanes' scales, the timing of channels, thrust told by levers."""
     derivatives = [Nuisance(name, name, SPREAD) for name in DERIVATIVE_NAMES]
     guessed = Nuisance("thrust", "thrust_factor_left+thrust_factor_right", THRUST_SPREAD, only="throttle")
     timing = (Nuisance("filter_frequency", "filter_frequency", FILTER_SPREAD),

@@ -43,45 +43,45 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
     Zero where the position was not recorded.
     """
     out = []
-    for surface in SURFACES:
-        name = f"{surface}_command"
-        if name in flight.commands and np.ptp(flight.commands[name]) > STILL_COMMAND:
-            rows = _differing(parameters, [f"{surface}_{quantity}" for quantity in ACTUATOR])
-            measured, good = flight.positions[surface], np.isfinite(flight.positions[surface])
-            if not good.any():
-                continue
-            predicted = follow(flight.commands[name], measured[good][0], parameters[rows], surface, flight.dt)
-            own = [term for term in terms if term.component == name.replace("command", "path")]
-            added = [predicted[:, 0] + path_course(flight, predicted[:, 0], term.name) for term in own]
-            left = np.where(good[:, None], measured[:, None] - np.column_stack([predicted, *added]), 0.0)
-            out.append((f"{surface}_path", _believed(flight, surface, left), rows + [term.row for term in own]))
+    for surface in (s for s in SURFACES if moves(flight, s)):
+        rows = _differing(parameters, [f"{surface}_{quantity}" for quantity in ACTUATOR])
+        measured, good = flight.positions[surface], np.isfinite(flight.positions[surface])
+        command = flight.commands[f"{surface}_command"]
+        predicted = follow(command, measured[good][0], parameters[rows], surface, flight.dt)
+        own = [term for term in terms if term.component == f"{surface}_path"]
+        added = [predicted[:, 0] + path_course(flight, predicted[:, 0], term.name) for term in own]
+        left = np.where(good[:, None], measured[:, None] - np.column_stack([predicted, *added]), 0.0)
+        out.append((f"{surface}_path", _believed(flight, surface, left), rows + [term.row for term in own]))
     return out + _engine_residuals(flight, parameters)
+
+
+def moves(flight: Reconstruction, surface: str) -> bool:
+    """Whether a surface's command moves and its position was recorded: else its path tells nothing."""
+    command = flight.commands.get(f"{surface}_command")
+    return bool(command is not None and np.ptp(command) > STILL_COMMAND
+                and np.isfinite(flight.positions[surface]).any())  # fmt: skip
 
 
 def _believed(flight: Reconstruction, surface: str, left: FloatArray) -> FloatArray:
     """What is left of a surface's positions [N, rows] over its noise: sample by sample, and a delay that lasts."""
-    noise = position_noise(flight, surface)[:, None]
-    delay = flight.timing * np.gradient(_whole(flight, surface), flight.dt)[:, None] / noise
-    delay *= np.any(left != 0.0, axis=1)[:, None]
+    rate, noise = position_noise(flight, surface)
+    over = left / noise[:, None]
+    delay = (flight.timing * rate / noise)[:, None] * np.any(left != 0.0, axis=1)[:, None]
     square = float(np.sum(delay**2))
     share = (1.0 - 1.0 / np.sqrt(1.0 + square)) / max(square, 1e-12)
-    return np.asarray(left / noise - share * delay * (delay.T @ (left / noise)))
+    return np.asarray(over - share * delay * (delay.T @ over))
 
 
-def _whole(flight: Reconstruction, surface: str) -> FloatArray:
-    """A recorded position, bridged where it was not [N]."""
-    good = np.isfinite(flight.positions[surface])
-    return np.interp(flight.time, flight.time[good], flight.positions[surface][good])
+def position_noise(flight: Reconstruction, surface: str) -> tuple[FloatArray, FloatArray]:
+    """Rate of a recorded position, bridged where it was not, and what it may be off its command's by [N].
 
-
-def position_noise(flight: Reconstruction, surface: str) -> FloatArray:
-    """What a recorded position may be off its command's by [N], samples counted as if they were CORRELATED apart.
-
-    Of the record alone: what noise is believed must not depend on the row that stands first.
+    Of the record alone: what noise is believed must not depend on the row that stands first. Samples count as if they
+    were CORRELATED apart.
     """
-    moving = maximum_filter1d(np.abs(np.gradient(_whole(flight, surface), flight.dt)), AROUND)
-    noise = np.hypot(max(POSITION_NOISE, white(flight.positions[surface])), flight.timing * moving)
-    return np.asarray(noise * _weight(flight))
+    measured, good = flight.positions[surface], np.isfinite(flight.positions[surface])
+    rate = np.gradient(np.interp(flight.time, flight.time[good], measured[good]), flight.dt)
+    noise = np.hypot(max(POSITION_NOISE, white(measured)), flight.timing * maximum_filter1d(np.abs(rate), AROUND))
+    return rate, noise * _weight(flight)
 
 
 def of_paths(flight: Reconstruction, components: Collection[str]) -> Reconstruction:

@@ -2,7 +2,7 @@
 
 A command may act in the step that ends at its sample, in the one that begins there, or in between where the recorder's
 step is not the controller's; taken wrongly, every actuator lags (or leads). One surface alone may have an effect, so
-that its vote is limited; and how sharply commands are known in time is what the surface that follows best tells.
+that its vote is limited; how sharply commands are known in time is what all surfaces tell, or all but one.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from icing_env.record import FloatArray
 from sim2real.channels import SURFACES
-from sim2real.paths import STILL_COMMAND, counted, follow, position_noise
+from sim2real.paths import counted, follow, moves, position_noise
 from sim2real.reconstruct import Reconstruction
 
 LAGS = np.array([0.0, -0.03, -0.015, 0.015, 0.03, 0.06, 0.1, 0.15, 0.22, 0.3, 0.5])  # s, beside the published one
@@ -29,7 +29,7 @@ SHARPNESS = np.array([0.1, 0.2, 0.4, 0.7, 1.0])  # of a sample's interval over t
 
 def in_step(flights: Sequence[Reconstruction]) -> list[Reconstruction]:
     """Records with their commands when positions say that they act, and how sharply that is known (`timing`)."""
-    moved = [s for s in SURFACES if any(_moves(flight, s) for flight in flights)]
+    moved = [s for s in SURFACES if any(moves(flight, s) for flight in flights)]
     if not moved:
         return list(flights)
     timing = [max(f.timing, f.dt / np.sqrt(12.0)) for f in flights]
@@ -50,12 +50,6 @@ def _shift(flights: Sequence[Reconstruction], moved: Sequence[str]) -> float:
     against[~whole] += LATER if len(moved) > 1 else np.inf
     against[SHIFTS == 1.0] += LATER
     return float(SHIFTS[np.argmin(against)])
-
-
-def _moves(flight: Reconstruction, surface: str) -> bool:
-    command = flight.commands.get(f"{surface}_command")
-    return bool(command is not None and np.ptp(command) > STILL_COMMAND
-            and np.isfinite(flight.positions[surface]).any())  # fmt: skip
 
 
 def _late(flight: Reconstruction, shift: float) -> Reconstruction:
@@ -80,26 +74,24 @@ def _sharpest(flights: Sequence[Reconstruction], moved: Sequence[str]) -> list[f
 
 
 def _counted(flights: Sequence[Reconstruction], surface: str) -> int:
-    return sum(counted(f, int(np.isfinite(f.positions[surface]).sum())) for f in flights if _moves(f, surface))
+    return sum(counted(f, int(np.isfinite(f.positions[surface]).sum())) for f in flights if moves(f, surface))
 
 
 def _square(flights: Sequence[Reconstruction], surface: str, shift: float, other: float) -> float:
     """Whitened square of a surface's positions behind its command, `shift` samples later; another lag costs `other`."""
-    total = np.zeros(len(LAGS))
-    for flight in flights:
-        if _moves(flight, surface):
-            total += _left(_late(flight, shift), surface)
+    lags = LAGS if np.isfinite(other) else LAGS[:1]
+    total = np.sum([_left(_late(flight, shift), surface, lags) for flight in flights if moves(flight, surface)], axis=0)
     return float(min(total[0], total.min() + other))
 
 
-def _left(flight: Reconstruction, surface: str) -> FloatArray:
-    """Whitened square at every lag [LAGS], geared and shifted as suits best."""
-    rows = np.repeat(flight.parameters, len(LAGS))
-    rows[f"{surface}_lag"] = np.maximum(rows[f"{surface}_lag"] + LAGS, 0.0)
+def _left(flight: Reconstruction, surface: str, lags: FloatArray) -> FloatArray:
+    """Whitened square at every lag beside the published one, geared and shifted as suits best."""
+    rows = np.repeat(flight.parameters, len(lags))
+    rows[f"{surface}_lag"] = np.maximum(rows[f"{surface}_lag"] + lags, 0.0)
     recorded = flight.positions[surface]
-    good, noise = np.isfinite(recorded), position_noise(flight, surface)
+    good, (_, noise) = np.isfinite(recorded), position_noise(flight, surface)
     where = follow(flight.commands[f"{surface}_command"], recorded[good][0], rows, surface, flight.dt)[good]
-    out = np.empty(len(LAGS))
+    out = np.empty(len(lags))
     for i, position in enumerate(where.T):
         basis = np.column_stack([position, np.ones(len(position))]) / noise[good, None]
         wanted = recorded[good] / noise[good]

@@ -6,11 +6,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from icing_env import scenario
+from icing_env import aircraft, scenario
 from icing_env.record import FlightRecord
 from sim2real.candidates import bank, not_testable
 from sim2real.channels import MEASURED
 from sim2real.diagnosis import diagnose
+from sim2real.powers import powers
 from sim2real.reconstruct import reconstruct
 from testbed.flight import fly
 
@@ -40,6 +41,17 @@ def test_powers_are_those_of_the_torque_whatever_they_are_told_by(absent, source
         power, told = true.controls[f"power_{side}"], flight.controls[f"power_{side}"]
         assert np.sqrt(np.mean((told - power) ** 2)) < within * np.mean(power)
     assert any("not recorded" in note for note in flight.notes)
+
+
+def test_a_lever_that_steps_moves_the_power_through_the_spool():
+    row, dt, n = aircraft.load(), 0.02, 500
+    lever = np.where(np.arange(n) < 100, 0.4, 0.6)
+    values = {"airspeed": np.full(n, 65.0), "alpha": np.zeros(n), "throttle_left": lever, "throttle_right": lever}
+    _, found = powers(row, values, np.full(n, 2200.0), dt, [])
+    share = (found["power_left"] - found["power_left"][0]) / (0.5 * found["power_left"][0])
+    assert share[:100] == pytest.approx(0.0, abs=1e-12)
+    since = dt * np.arange(1, n - 99)
+    assert share[100:] == pytest.approx(1.0 - np.exp(-since / row["spool_time"][0]), abs=1e-9)
 
 
 def test_what_the_axial_acceleration_stands_for_is_compared_and_tested_no_more():

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from testbed.withheld.draw import SIGMAS, Design, Fault, conditions, published_spread, size_of
 from testbed.withheld.effects import EFFECTS
+from testbed.withheld.files import COMMANDS
 
 ANGLES = ("alpha", "beta", "p", "q", "r", "phi", "theta", "elevator", "aileron", "rudder")
 FORCES = ("ax", "ay", "az")
@@ -22,9 +23,8 @@ KINDS: dict[str, tuple[str, ...]] = {
     "sign": (*ANGLES, *FORCES), "unit": (*EVERY, "altitude"), "stuck": EVERY, "dropped": EVERY, "blank": EVERY,
     "skew": EVERY, "slow": EVERY, "dropouts": EVERY, "between": ("commands",), "engines": ("engines",),
     "powerless": ("engines",)}  # fmt: skip
-SURFACES = ("elevator_command", "aileron_command", "rudder_command")
+SURFACES, LEVERS = COMMANDS[:3], COMMANDS[3:]
 ENGINES = ("thrust_left", "thrust_right", "torque_left", "torque_right", "rpm_left", "rpm_right")
-LEVERS = ("throttle_left", "throttle_right")
 FACTORS = {"airspeed": 1.0 / 0.514444, "altitude": 1.0 / 0.3048, **dict.fromkeys(ANGLES, 180.0 / math.pi),
            **dict.fromkeys(FORCES, 1.0 / 9.80665)}  # knots, ft, deg, g
 MOST, SHARE = 60, 0.16  # cases: 24 beside 150, 60 beside 2,400
