@@ -25,7 +25,9 @@ from sim2real.terms import BEYOND, GENERIC, Term
 # model's own uncertainty. A record's mass is known to about 1 % (assumed).
 SPREAD, MASS_SPREAD = 0.05, 0.01
 THRUST_SPREAD = 0.3  # of power that was not recorded and is told by the levers (assumed)
-FILTER_SPREAD, VANE_SPREAD = 0.1, 0.005  # of the recording's cut-off, and s: channels are in step to a few ms (assumed)
+FILTER_SPREAD = 0.1  # of the recording's cut-off: channels are in step to a few ms (assumed)
+# s, s, rad s2/m: instruments that no paper describes may as well have no lag, and no boom (assumed)
+VANE_SPREAD, PITOT_SPREAD, BOOM_SPREAD = 0.008, 0.05, 1e-4
 VANE_SCALE = 0.015  # of a flow vane's reading, upwash included (assumed)
 LEAST = 0.1  # of a published value: a filter or a thrust with another sign does not fly
 NUISANCE_STEP = 0.1  # standard deviations at which the derivative with respect to a nuisance is taken
@@ -49,7 +51,8 @@ class Nuisance:
         step = size * self.factor
         for name in self.parameter.split("+"):
             now = rows[name][row]
-            rows[name][row] = now + step if self.absolute else now * np.maximum(1.0 + step, LEAST)
+            moved = now + step if self.absolute else now * np.maximum(1.0 + step, LEAST)
+            rows[name][row] = np.maximum(moved, 0.0) if name.endswith("_lag") else moved
 
 
 def shifted(parameters: NDArray, directions: tuple[Nuisance, ...], sizes: FloatArray, power_from: str) -> NDArray:
@@ -90,11 +93,12 @@ class Bank:
 
 
 def nuisances() -> tuple[Nuisance, ...]:
-    """Derivatives by `SPREAD`, mass, the vanes' scales, the timing of channels, thrust told by levers."""
+    """Derivatives by `SPREAD`, mass, the vanes' scales, lags and boom, the recorder, thrust told by levers."""
     derivatives = [Nuisance(name, name, SPREAD) for name in DERIVATIVE_NAMES]
     guessed = Nuisance("thrust", "thrust_factor_left+thrust_factor_right", THRUST_SPREAD, only="throttle")
+    known = {"vane_lag": VANE_SPREAD, "pitot_lag": PITOT_SPREAD, "boom_gain": BOOM_SPREAD}
     timing = (Nuisance("filter_frequency", "filter_frequency", FILTER_SPREAD),
-              Nuisance("vane_lag", "vane_lag", VANE_SPREAD, True))
+              *(Nuisance(name, name, spread, True) for name, spread in known.items()))
     vanes = [Nuisance(f"scale_{c}", f"scale_{c}", VANE_SCALE, True, follows=False) for c in ("alpha", "beta")]
     return (*derivatives, Nuisance("mass", "mass", MASS_SPREAD), guessed, *vanes, *timing)
 

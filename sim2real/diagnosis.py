@@ -21,6 +21,7 @@ from sim2real.evidence import Evidence
 from sim2real.form import at_home
 from sim2real.history import SAME, History, histories
 from sim2real.hypotheses import P_NONE, P_UNKNOWN, Hypothesis, Posterior
+from sim2real.instruments import with_recorder
 from sim2real.ladder import ladder
 from sim2real.limits import limits
 from sim2real.manoeuvre import next_manoeuvre
@@ -166,6 +167,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
 def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, simulator: Rollout | None
                    ) -> list[Reconstruction]:  # fmt: skip
     """Records over the model that references corrected, or over a simulator of the user's so corrected."""
+    records = with_recorder(records)
     flights = [reconstruct(record) for record in records] if baseline is None else [
         replace(reconstruct(record, baseline.near(record)), inadequacy=baseline.inadequacy) for record in records]
     flights = in_common([placed(flight) for flight in in_step(flights)])

@@ -21,6 +21,7 @@ from icing_env.jit import entry
 from icing_env.propulsion import power_available
 from icing_env.record import FloatArray
 from sim2real.channels import SURFACES
+from sim2real.instruments import UNFILTERED
 from sim2real.noise import white
 from sim2real.reconstruct import Reconstruction
 from sim2real.terms import Term, path_course
@@ -31,7 +32,6 @@ CORRELATED = 0.5  # s in which errors of a position's calibration and timing sta
 POWER_NOISE = 0.01  # of full power
 PATHS = (*(f"{surface}_path" for surface in SURFACES), "propulsion")  # components; the last has more than its path
 ACTUATOR = ("lag", "rate", "min", "max", "gearing", "offset")
-UNFILTERED = 1e6  # Hz: no low pass
 STILL_COMMAND, STILL_LEVER = 1e-4, 1e-3  # rad, 0..1: a command that moves less tests nothing
 
 

@@ -18,6 +18,7 @@ from icing_env import aircraft
 from icing_env.atmosphere import density, static_air
 from icing_env.errors import InputError
 from icing_env.record import DataProblem, FlightRecord, FloatArray
+from sim2real import instruments
 from sim2real.channels import LATERAL, MEASURED, NOISE_FLOOR, SURFACE_NOISE, SURFACES
 from sim2real.noise import step_noise, white
 from sim2real.powers import powers
@@ -133,8 +134,9 @@ def reconstruct(record: FlightRecord, base: NDArray | None = None) -> Reconstruc
         notes.append(f"thinned from {1/grid.dt:.0f} to {1/(grid.dt*every):.0f} samples/s")
     time, dt = time[::every], grid.dt * every
     values = {n: v[::every] for n, v in values.items()}
-    measured = _measured(record, grid.time[::every], values, dt)
     row = _airframe(record, aircraft.load() if base is None else base.copy(), values, notes)
+    instruments.declared(row, record, values, dt, notes)
+    measured = _measured(record, grid.time[::every], values, dt)
     altitude = _air(row, values, notes)
     row["wind_reference_altitude"] = float(np.median(altitude))  # a steady wind shows nowhere; only its change does
     moved = {n: values[n] if n in values else np.zeros(len(time)) for n in SURFACES}

@@ -34,7 +34,8 @@ BEYOND: dict[str, float] = {
     "Cm_alphadot": 0.4, "engine_arm_z": 0.02, "thrust_factor_left+thrust_factor_right": 0.02, "CX_elevator": 5e-3,
     "CZ_alpha2": 0.3, "Cm_alpha2": 0.1, "Cm_alpha_elevator": 0.1, "CY_alpha_beta": 0.1, "Cl_alpha_beta": 0.02,
     "Cn_alpha_beta": 0.02}  # fmt: skip
-FIXED = ("mass", "thrust", "filter_frequency", "vane_lag")  # a matter of each record and its recorder
+# a matter of each record and its recorder
+FIXED = ("mass", "thrust", "filter_frequency", "vane_lag", "pitot_lag", "boom_gain")
 REPEATABLE = 0.2  # standard deviations: no number is known better for another flight (assumed; 1 %, 4 ms of a lag)
 LEAST = 1e-3  # of a published step: a number near zero has a nuisance that hardly moves it
 

@@ -18,8 +18,9 @@ from scipy.stats import chi2
 
 from icing_env.record import FloatArray
 from sim2real.channels import SURFACES
+from sim2real.instruments import UNFILTERED
 from sim2real.noise import white
-from sim2real.paths import UNFILTERED, follow
+from sim2real.paths import follow
 from sim2real.reconstruct import Reconstruction
 from sim2real.timing import LAGS
 

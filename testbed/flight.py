@@ -212,14 +212,14 @@ def _record(kept: dict[str, NDArray[Any]], world: World, seed: int) -> FlightRec
 
 
 def _sensors(p: Any, dt: float) -> dict[str, Any]:
-    """What calibration knows of the instruments, as a record's side file declares it; empty for perfect ones.
+    """What calibration knows of the instruments, as a record's side file declares it.
 
     Lags as a slow change shows them: a lag that takes in the newest value once a step is late by dt (1 - g)/g.
     """
-    lags = {"alpha": p["vane_lag"], "beta": p["vane_lag"], "airspeed": p["pitot_lag"]}
-    known = {name: {"lag": float(dt/np.expm1(dt/lag))} for name, lag in lags.items() if lag > 0.0}
-    if p["boom_gain"] > 0.0:
-        known["alpha"] = known.get("alpha", {}) | {"bending": float(p["boom_gain"])}
+    lags = {"alpha": p["vane_lag"], "beta": p["vane_lag"], "airspeed": p["pitot_lag"],
+            "filter": 1.0/(2.0*np.pi*p["filter_frequency"])}
+    known = {name: {"lag": float(dt/np.expm1(dt/max(lag, 1e-4)))} for name, lag in lags.items()}
+    known["alpha"]["bending"] = float(p["boom_gain"])
     return known
 
 

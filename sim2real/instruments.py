@@ -1,0 +1,143 @@
+"""What a record's instruments do to what they read: as its side file declares, else as the aircraft file has them.
+
+The table `sensors` may declare, beside what identification reads (`estimators.signals.instruments`), the low pass of
+the recorder: `filter = { lag = 0.008 }` in s by which a slow change shows late, or `{ frequency = 10.0 }` in Hz, 0 for
+none. It acts on flow angles, rates, accelerations and surfaces, and not on attitudes. Those therefore tell of it, since
+an attitude is the integral of rates whatever flies (Klein & Morelli, Aircraft System Identification, AIAA 2006, chapter
+10): what is integrated from rates that are late by L lacks L times the rate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.compatibility.flow_angles import at_centre_of_gravity
+from estimators.signals.instruments import calibration, rate, time_constant
+from estimators.signals.resample import common_grid
+from icing_env import aircraft
+from icing_env.errors import InputError
+from icing_env.record import FlightRecord, FloatArray
+
+STEP = 0.02  # s, at which the aircraft file's instruments take in what they read (icing_env.simulate)
+UNFILTERED = 1e6  # Hz: no low pass
+LONGEST = 0.05  # s: a recorder's low pass is not slower, nor do attitudes lag more (assumed)
+KNOWN, APART = 0.002, 0.003  # s: how well attitudes have to tell a low pass, and how far it has to be from the file's
+SPAN, FEWEST = 5.0, 6  # s over which attitudes and integrated rates are compared (gyros drift beyond), and how often
+RATES = ("p", "q", "r", "phi", "theta")
+FLOOR = 2e-4  # s: no lag of a recorder is known better (assumed)
+MISSING = 0.02  # share of samples that a channel may lack there
+
+
+def lateness(lag: float, dt: float) -> float:
+    """Time by which a first-order lag updated every `dt` with its newest value shows a slow change late, s."""
+    return dt / math.expm1(dt / lag) if lag > 0.0 else 0.0
+
+
+def with_recorder(records: Sequence[FlightRecord]) -> list[FlightRecord]:
+    """Records that declare no low pass declare the one that their attitudes tell of, where it is not the file's."""
+    silent = [record for record in records if "filter" not in record.meta.sensors]
+    told = [lags for record in silent if (lags := recorder_lags(record)) is not None]
+    if not told:
+        return list(records)
+    value, error = np.moveaxis(np.array(told), 2, 0)  # [records, axes]
+    pooled = np.sum(value / error**2, axis=0) / np.sum(error**-2.0, axis=0)
+    sharp = np.sum(error**-2.0, axis=0) ** -0.5
+    axis = int(np.argmin(sharp))
+    lag, file = float(pooled[axis]), _published_lag()
+    if sharp[axis] > KNOWN or abs(lag) > LONGEST or abs(lag - file) < max(APART, 3.0 * sharp[axis]):
+        return list(records)
+    found = {"filter": {"lag": max(lag, 0.0), "found": True}}
+    return [replace(r, meta=replace(r.meta, sensors={**found, **r.meta.sensors})) for r in records]
+
+
+def _published_lag() -> float:
+    cut = float(aircraft.load()["filter_frequency"][0])
+    return lateness(1.0 / (2.0 * math.pi * cut), STEP)
+
+
+def recorder_lags(record: FlightRecord) -> list[tuple[float, float]] | None:
+    """By how much rates show later than attitudes, and its standard error [s], in pitch and in roll; None if unknown.
+
+    Beside the lag, integrated rates may differ by their scale and by a part of the other angle (gyros that are not
+    square). Errors are those of spans that count as one each (Liang & Zeger's sandwich, Biometrika 73, 1986).
+    """
+    sparse = [n for n in RATES if n not in record.channels or np.mean(~np.isfinite(record[n])) > MISSING]
+    if sparse or len(record) < 20 * FEWEST:
+        return None
+    grid = common_grid(record)
+    p, q, r, phi, theta = (grid.values[n] for n in RATES)
+    turning = q * np.sin(phi) + r * np.cos(phi)
+    return [_lead(theta, q * np.cos(phi) - r * np.sin(phi), phi, grid.dt),
+            _lead(phi, p + np.tan(theta) * turning, theta, grid.dt)]
+
+
+def _lead(angle: FloatArray, turns: FloatArray, other: FloatArray, dt: float) -> tuple[float, float]:
+    """Lag of the rate `turns` behind the `angle` that it makes, and its standard error, s."""
+    made = np.concatenate([[0.0], np.cumsum(0.5 * (turns[1:] + turns[:-1]) * dt)])
+    columns = np.column_stack([turns, angle, other, angle - made])
+    length = min(round(SPAN / dt), len(made) // FEWEST)
+    spans = columns[: len(columns) // length * length].reshape(-1, length, 4)
+    line = np.linalg.qr(np.column_stack([np.ones(length), np.linspace(-1.0, 1.0, length)]))[0]
+    spans = spans - line @ (line.T @ spans)
+    X, y = spans[:, :, :3], spans[:, :, 3]
+    bread = np.linalg.pinv(np.einsum("sni,snj->ij", X, X))
+    x = bread @ np.einsum("sni,sn->i", X, y)
+    each = np.einsum("sni,sn->si", X, y - X @ x) @ bread
+    count = len(spans)
+    return float(x[0]), float(np.sqrt(np.sum(each[:, 0] ** 2) * count / (count - 3)) + FLOOR)
+
+
+def declared(row: NDArray, record: FlightRecord, values: dict[str, FloatArray], dt: float, notes: list[str]) -> None:
+    """Give the model's `row` the instruments of a record, and bring `values` to the centre of gravity.
+
+    Raises:
+        InputError: a declaration that is none.
+    """
+    sensors, known = record.meta.sensors, calibration(record.meta.sensors)
+    corrected, told = at_centre_of_gravity(values, sensors, dt)
+    values |= corrected
+    notes.extend(told)
+    for name, lag in (("airspeed", "pitot_lag"), ("alpha", "vane_lag")):
+        stated = name in known.lags or "lag" in _table(sensors, name)
+        late = known.lag(name) if stated else lateness(float(row[lag][0]), STEP)
+        if stated or abs(dt - STEP) > 1e-6:
+            row[lag] = time_constant(late, dt)
+        notes.extend([f"{name} late by {1e3 * late:.3g} ms, as declared"] if stated else [])
+    if "beta" in values and "lag" in _table(sensors, "beta"):
+        vane = lateness(float(row["vane_lag"][0]), dt)
+        extra = known.lag("beta") - vane  # the model's vanes are alike
+        values["beta"] = values["beta"] + (extra * rate(values["beta"], dt, abs(extra)) if extra else 0.0)
+    if "bending" in _table(sensors, "alpha"):
+        row["boom_gain"] = known.bending
+    _recorder(row, sensors, dt, notes)
+
+
+def _recorder(row: NDArray, sensors: Any, dt: float, notes: list[str]) -> None:
+    table = _table(sensors, "filter")
+    for key in ("lag", "frequency"):
+        value = table.get(key, 0.0)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
+            raise InputError(f"sensors.filter.{key} must be a number, 0 for no low pass, got {value!r}")
+    if "lag" in table:
+        late = float(table["lag"])
+    elif "frequency" in table:
+        late = 1.0 / (2.0 * math.pi * table["frequency"]) if table["frequency"] else 0.0
+    elif abs(dt - STEP) > 1e-6:
+        late = _published_lag()
+    else:
+        return
+    row["filter_frequency"] = 1.0 / (2.0 * math.pi * time_constant(late, dt)) if late > 0.0 else UNFILTERED
+    if table:
+        how = "attitudes tell" if table.get("found") else "declared"
+        notes.append(f"low pass of the recorder late by {1e3 * late:.3g} ms, as {how}")
+
+
+def _table(sensors: Any, name: str) -> Any:
+    entry = sensors.get(name, {})
+    return entry if isinstance(entry, dict) else {}
