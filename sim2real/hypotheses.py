@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from scipy.special import logsumexp, softmax
@@ -23,7 +24,7 @@ SAME_PLACE = 0.02  # of that where two members are faults of one device: another
 # Of the probability, that the evidence misleads: of 46 answers of 0.9 and more to gaps of development, 38 were right.
 DOUBT = 0.14
 NEXT = 0.8  # of the doubt, that it is one of those ranked next, each half as likely as the one before (assumed)
-ELSEWHERE = 10.0  # log evidence that another form leaves at other places: 4 to 13 in three answers of a sealed set
+ELSEWHERE = 10.0  # log evidence that another form leaves elsewhere: 4 to 13 in three answers of a sealed set
 KEPT = 1e-5  # sets of several effects less probable than this are dropped
 
 
@@ -185,14 +186,27 @@ def forgive(found: Sequence[Hypothesis], nothing: float, least: float, bare: flo
 
 
 def _leaking(found: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Something unknown beside effects that are in another form themselves, less what such a form leaves elsewhere.
+    """Company of effects that are in another form themselves, less what such a form leaves elsewhere.
 
     No form is wholly a free course at the effect's own place; what it leaves at others goes with it, and is no second
     gap. An effect that is the library's leaves nothing.
     """
     bent = {h.effects: h.regained for h in found if h.effects and h.unknown is None}
-    return [replace(h, regained=h.regained - float(np.clip(bent.get(h.effects, 0.0), 0.0, ELSEWHERE)))
-            if h.effects and h.unknown is not None else h for h in found]
+
+    def smaller(h: Hypothesis) -> list[float]:
+        most = len(h.effects) - (h.unknown is None)
+        return [bent.get(some, 0.0) for n in range(1, most + 1) for some in combinations(h.effects, n)]
+
+    return [replace(h, regained=h.regained - elsewhere(max(smaller(h), default=0.0))) for h in found]
+
+
+def elsewhere(regained: float) -> float:
+    """Log evidence that another form which regains so much may leave at other places: as much at most, and slowly more.
+
+    ELSEWHERE, and that again for each ten times of it that the form regains (assumed).
+    """
+    more = max(regained, 0.0) / ELSEWHERE
+    return ELSEWHERE * min(more, 1.0 + float(np.log10(max(more, 1.0))))
 
 
 def _with_guests(h: Hypothesis, larger: Sequence[Hypothesis], nothing: float) -> Hypothesis:

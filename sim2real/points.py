@@ -25,6 +25,7 @@ from sim2real.side_by_side import each
 from sim2real.steps import (
     DIFFERENCE,
     FARTHEST,
+    SETTLED,
     SIZE_STEP,
     Place,
     Point,
@@ -43,6 +44,7 @@ SIDE_BY_SIDE = 6  # steps with the same slopes where many sets take them togethe
 HOPELESS = 100.0  # log likelihood from the best, and half of what that explains, beyond which nothing is tried further
 TURNS = 3  # how often slopes by nuisances are flown anew
 NEAR = 5.0  # such a gain, of a point so near that its slopes will do
+ROUGH = 1e-3  # share of half the square above noise, that a turn has to take of it
 FAR = 1000.0  # whitened square above the linear fit's that makes another start worth a flight
 
 
@@ -73,11 +75,19 @@ class Flying:
         for _ in range(TURNS):
             best = self.lower(fit, best)
             best = self.point(fit, best.sizes, best.nuisances)
-            gain = promised(best, step_from(fit, best))
+            before, gain = best.cost, promised(best, step_from(fit, best))
             best = self._descended(fit, best)
-            if gain < NEAR:
+            if gain < NEAR or before - best.cost < self.worth(best):
                 break
         return best
+
+    def worth(self, point: Point) -> float:
+        """Log likelihood that another turn has to gain: what is far from noise is not told from others by units.
+
+        Where much is left that the set does not have, Gauss and Newton's steps lead past the best: most do not help.
+        """
+        noise = sum(e.samples for e in self.evidences) / self.tempering
+        return max(SETTLED, ROUGH * (point.cost - 0.5 * noise))
 
     def lower(self, fit: SetFit, best: Point) -> Point:
         """The point, or one further along a valley where numbers of the aircraft are as they are here, if lower."""

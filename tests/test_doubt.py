@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from sim2real.candidates import bank
 from sim2real.generic import UnknownFit
-from sim2real.hypotheses import DOUBT, ELSEWHERE, Hypothesis, _leaking, doubted, normalised
+from sim2real.hypotheses import DOUBT, ELSEWHERE, Hypothesis, _leaking, doubted, elsewhere, normalised
 from sim2real.sets import SetFit
 
 SOMETHING = UnknownFit("x_force", 0.0, (("1", 1.0, 0.1),), 0.0, {})
@@ -44,10 +44,26 @@ def test_no_gap_is_not_doubted():
     assert [h.probability for h in doubted(found)] == [h.probability for h in found]
 
 
-@given(st.floats(-5.0, 400.0))
-def test_something_unknown_beside_another_form_is_less_by_what_forms_leave_elsewhere(regained):
-    updraft, wing = (SetFit((next(f for f in bank().families if f.effect.name == n),)) for n in ("updraft", "wing_ice"))
-    found = [Hypothesis(updraft, None, -5.0, 100.0, regained=regained), Hypothesis(updraft, SOMETHING, -9.0, 140.0),
-             Hypothesis(wing, SOMETHING, -9.0, 50.0), Hypothesis(SetFit(), SOMETHING, -3.0, 80.0)]  # fmt: skip
+def one(*names: str) -> SetFit:
+    """A set of effects that nobody flew."""
+    return SetFit(tuple(next(f for f in bank().families if f.effect.name == name) for name in names))
+
+
+@given(st.floats(-5.0, 4000.0))
+def test_company_of_another_form_is_less_by_what_forms_leave_elsewhere(regained):
+    found = [Hypothesis(one("updraft"), None, -5.0, 100.0, regained=regained),
+             Hypothesis(one("updraft"), SOMETHING, -9.0, 140.0),
+             Hypothesis(one("updraft", "wing_ice"), None, -10.0, 140.0, regained=regained),
+             Hypothesis(one("fin_ice", "updraft", "wing_ice"), None, -16.0, 150.0),
+             Hypothesis(one("fin_ice", "wing_ice"), None, -10.0, 50.0),
+             Hypothesis(one("wing_ice"), SOMETHING, -9.0, 50.0), Hypothesis(SetFit(), SOMETHING, -3.0, 80.0)]
     less = [before.log_posterior - after.log_posterior for before, after in zip(found, _leaking(found), strict=True)]
-    assert less == pytest.approx([0.0, min(max(regained, 0.0), ELSEWHERE), 0.0, 0.0])
+    least = elsewhere(regained)
+    assert less == pytest.approx([0.0, least, least, least, 0.0, 0.0, 0.0])
+
+
+def test_what_a_form_leaves_elsewhere_grows_slowly():
+    assert elsewhere(-3.0) == 0.0
+    assert elsewhere(4.0) == pytest.approx(4.0)
+    assert elsewhere(ELSEWHERE) == pytest.approx(ELSEWHERE)
+    assert elsewhere(1e3 * ELSEWHERE) == pytest.approx(4.0 * ELSEWHERE)
