@@ -31,6 +31,7 @@ SIGMAS = (0.003, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.55, 0.67,
           3.2)  # fmt: skip
 SETTLE = 4.0  # s, until the predictor has forgotten how it was started
 CHUNK = 500  # samples whitened at a time
+TOGETHER = 100  # samples that the channels have to share for their covariance to be judged
 NONE = Responses()
 FARTHEST = 1e5  # noise units: a variant that departs from flight is no nearer to the record for being a number
 
@@ -159,16 +160,21 @@ def likelihoods(flight: Reconstruction, options: Sequence[Gain], pushed: Sequenc
     everywhere = tuple(replace(push, row=i) for push in pushed for i in range(len(options)))
     left = innovations(flight, np.repeat(flight.parameters, len(options)), np.stack([g.K for g in options]), everywhere)
     left = left[round(SETTLE / flight.dt) :]
+    seen = np.isfinite(left[:, 0, : FED_BACK - 1])
+    use = np.flatnonzero(seen.sum(axis=0) > 0.5 * seen.sum(axis=0).max())
+    together = seen[:, use].all(axis=1)
     scores = []
     for i, gain in enumerate(options):
-        use = [c for c in range(FED_BACK - 1) if flight.has(MEASURED[c])]
-        z = np.nan_to_num(left[:, i, use].astype(float))
-        if np.max(np.abs(z), initial=0.0) >= LOST:
+        S = gain.S[np.ix_(use, use)]
+        if together.sum() < TOGETHER:  # channels that take turns: each by itself
+            factor, white = np.diag(np.sqrt(np.diag(S))), left[:, i, use] / np.sqrt(np.diag(S))
+        else:
+            factor = np.linalg.cholesky(S)
+            white = np.linalg.solve(factor, left[together, i][:, use].astype(float).T).T
+        if np.nanmax(np.abs(left[:, i, use]), initial=0.0) >= LOST:
             scores.append(-np.inf)
             continue
-        factor = np.linalg.cholesky(gain.S[np.ix_(use, use)])
-        white = np.linalg.solve(factor, z.T)
-        away = np.median(np.abs(white - np.median(white, axis=1, keepdims=True)), axis=1)
+        away = np.nanmedian(np.abs(white - np.nanmedian(white, axis=0)), axis=0)
         scores.append(-0.5 * float(np.sum((1.4826 * away) ** 2)) - float(np.sum(np.log(np.diag(factor)))))
     return scores
 
@@ -190,15 +196,17 @@ def whitening(left: FloatArray, gain: Gain, flight: Reconstruction) -> FloatArra
     """
     n, settled = len(MEASURED), slice(round(SETTLE / flight.dt), None)
     use = np.array([c for c in range(FED_BACK - 1) if flight.has(MEASURED[c])], np.intp)
-    out = np.zeros((len(left), n, n))
-    S = gain.S[..., use[:, None], use]
-    out[:, use[:, None], use] = np.linalg.inv(np.linalg.cholesky(S))
+    out, seen = np.zeros((len(left), n, n)), np.isfinite(left)
+    for pattern in np.unique(seen[:, use], axis=0):
+        own, at = use[pattern], np.flatnonzero((seen[:, use] == pattern).all(axis=1))
+        S = gain.S[at] if gain.S.ndim == 3 else gain.S
+        out[np.ix_(at, own, own)] = np.linalg.inv(np.linalg.cholesky(S[..., own[:, None], own]))
     for c in range(FED_BACK - 1, n):
         if flight.has(MEASURED[c]):
             out[:, c, c] = 1.0 / max(_spread(left[settled, c]), NOISE_FLOOR[MEASURED[c]])
     white = whiten(left[:, None], out)[settled, 0]
     for c in use:
-        out[:, c] /= max(_spread(white[:, c]), 0.3)
+        out[:, c] /= max(_spread(white[seen[settled, c], c]), 0.3)
     return out / np.sqrt(worth_less(flight))[:, None]
 
 

@@ -15,7 +15,7 @@ from icing_env.aircraft import load
 from icing_env.record import read
 from sim2real.channels import MEASURED
 from sim2real.diagnosis import _reconstructed
-from sim2real.evidence import SETTLE, SIGMAS, whiten, whitening
+from sim2real.evidence import SETTLE, SIGMAS, choose_gain, whiten, whitening
 from sim2real.kalman import _within_steps, follow, gains, gust_noise, linearise
 from sim2real.noise import step_noise
 from sim2real.predictor import TANGENT, Predictor, innovations
@@ -53,6 +53,34 @@ def test_innovations_of_a_known_aircraft_are_white(tmp_path, sigma):
     blocks = np.concatenate([w.mean(axis=1) for w in white])
     square = dict(zip(FELT, BLOCK * np.mean(blocks**2, axis=0), strict=True))  # one, were it white; to 0.14
     assert all(0.4 < s < 1.6 for s in square.values()), square
+
+
+def kept(flight: Reconstruction, samples: dict[str, slice]) -> Reconstruction:
+    """The record with only some samples of some channels."""
+    measured = flight.measured.copy()
+    for name, which in samples.items():
+        column = np.full(len(measured), np.nan)
+        column[which] = measured[which, MEASURED.index(name)]
+        measured[:, MEASURED.index(name)] = column
+    return replace(flight, measured=measured)
+
+
+@pytest.mark.parametrize("samples", [{"r": slice(0, None, 5)}, {"ay": slice(0, 1200)}, {"airspeed": slice(3, None, 5)},
+                                     {name: slice(k % 5, None, 5) for k, name in enumerate(FELT)}])  # fmt: skip
+def test_channels_that_are_slow_or_stop_are_worth_their_samples(tmp_path, samples):
+    """Their noise is that of the samples there are, and where there is none nothing counts."""
+    flight = kept(flown(tmp_path, 0.5, 1), samples)
+    gain = choose_gain(flight, gains(flight, SIGMAS))
+    # gains are those of channels read at every step: with all taking turns, a gust is told too weak
+    assert (0.3 if len(samples) < len(FELT) else 0.1) < gain.sigma < 0.8
+    gain = follow(flight, gain)
+    left = innovations(flight, flight.parameters, gain.K)
+    first = round(SETTLE / flight.dt)
+    v = whiten(left, whitening(left[:, 0], gain, flight))[first:, 0, : len(FELT)]
+    seen = np.isfinite(flight.measured[1 + first :, : len(FELT)])
+    assert np.all(v[~seen] == 0.0)
+    squares = {name: float(np.mean(v[seen[:, c], c] ** 2)) for c, name in enumerate(FELT)}
+    assert all(0.6 < s < 1.7 for s in squares.values()), squares
 
 
 def test_gusts_between_samples_disturb_as_much_as_flights_show(tmp_path):
