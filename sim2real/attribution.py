@@ -202,7 +202,7 @@ def _with_unknown(reduced: FloatArray, raw: FloatArray, bank: Bank, known: Hypot
     own: UnknownFit | None = None
     if known.effects:
         fits = fit_unknown(beside(reduced, bank, known.fit, _slopes(known.fit)), bank)
-        own, fits = split(known.fit, fits, float(reduced[0, 0]), raw)
+        own, fits = split(known.fit, known.form, fits, float(reduced[0, 0]), raw)
     if not fits:
         return own, []
     best = max(fits, key=lambda u: u.log_evidence)

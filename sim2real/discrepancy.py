@@ -22,8 +22,8 @@ from sim2real.attribution import nuisance_mean, reduce, with_prior
 from sim2real.candidates import Bank, Nuisance, shifted
 from sim2real.channels import SURFACES, TOLERANCE
 from sim2real.evidence import Evidence, compare
+from sim2real.form import WORTH
 from sim2real.hypotheses import Hypothesis, Posterior
-from sim2real.other_form import WORTH
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.sets import SetFit

@@ -33,6 +33,7 @@ UNKNOWN_FORGIVEN = 1.0  # the same of what generic terms explain where something
 DIRECTIONS = 10.0  # in which such a remainder lies for every component at home (assumed)
 LUCK = 15.0  # whitened square that a free course at one component takes by luck (deviation of 120 knots' chance)
 MOSTLY, SHAPE = 0.6, 0.8  # of what generic terms explain, of their shape: an effect that is more of it is what they are
+WORTH = 20.0  # log evidence that terms have to add, to be flown
 LEAST = 3.0  # whitened size of a set's signature below which its form does not matter
 # Generic terms by which an effect that enters at a component may differ from the library's.
 ALIKE = {
@@ -246,10 +247,15 @@ def _bent(fit: SetFit, unknown: UnknownFit) -> bool:
                for name, _, _ in unknown.terms)  # fmt: skip
 
 
-def split(fit: SetFit, fits: Sequence[UnknownFit], nothing: float,
+def split(fit: SetFit, form: Form | None, fits: Sequence[UnknownFit], nothing: float,
           raw: FloatArray) -> tuple[UnknownFit | None, list[UnknownFit]]:
-    """The best of the generic fits beside a set that is its own form, and the fits that are not."""
-    own = [u for u in fits if is_own(fit, u, nothing, raw)]
+    """The best of the generic fits beside a set that is its own form, and the fits that are not.
+
+    What terms at home do beside a set, and its form does as well, is that form, told in fewer terms.
+    """
+    as_well = -np.inf if form is None else float(np.logaddexp.reduce(form.gained))
+    own = [u for u in fits if is_own(fit, u, nothing, raw)
+           or (at_home(u.component, fit.effects) and WORTH < u.log_evidence <= as_well)]  # fmt: skip
     return max(own, key=lambda u: u.log_evidence, default=None), [u for u in fits if u not in own]
 
 

@@ -13,14 +13,13 @@ import numpy as np
 
 from icing_env.record import FloatArray
 from sim2real.courses import Remainder
-from sim2real.form import Form
+from sim2real.form import WORTH, Form
 from sim2real.generic import UnknownFit
 from sim2real.home_terms import gain
 from sim2real.points import Flying
 from sim2real.sets import SetFit
 from sim2real.steps import Point, bounded_step, rooms, size_steps
 
-WORTH = 20.0  # log evidence that terms have to add, to be flown
 ROUNDS, SETTLED = 4, 0.5  # steps towards the best, and the gain of log evidence below which one is the last
 
 

@@ -25,6 +25,7 @@ from sim2real.form import (
     SHAPE,
     SHARES,
     UNKNOWN_FORGIVEN,
+    WORTH,
     Form,
     Liberty,
     alike,
@@ -51,7 +52,7 @@ from sim2real.hypotheses import (
     normalised,
     set_prior,
 )
-from sim2real.other_form import WORTH, Bent, flown_squares, flown_unknown, other_form
+from sim2real.other_form import Bent, flown_squares, flown_unknown, other_form
 from sim2real.points import Flying
 from sim2real.sets import SetFit
 from sim2real.steps import Point
@@ -241,7 +242,7 @@ class _Search:
         remainder, gained, own = self.left[i], 0.0, None
         fits = self.generic[i]
         if known.effects and known.form is not None:
-            own, fits = split(known.fit, fits, self.nothing, self.linear.raw)
+            own, fits = split(known.fit, known.form, fits, self.nothing, self.linear.raw)
             if len(known.effects) > 1:  # a third cause: two effects of no account would pay for its terms
                 return own, []
             ways = [known.form.way(k, self.nothing, self._least(), self._bare()) for k in range(len(known.form.gained))]
@@ -251,7 +252,7 @@ class _Search:
                 left = remainder.reduced()
                 left = given(left, *self._room(i, known, left), SHARES[k - 1])
                 fits = fit_unknown_left(left, self.flying.candidates)
-                fits = split(known.fit, fits, self.nothing, self.linear.raw)[1]
+                fits = split(known.fit, known.form, fits, self.nothing, self.linear.raw)[1]
         fits = [u for u in fits if not self._named(u, known)]
         if not fits:
             return own, []
@@ -262,8 +263,7 @@ class _Search:
             best = max(fits, key=lambda u: u.log_evidence)
         more = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
         prior = np.log(P_BESIDE / (1.0 - P_NONE)) + known.log_prior if known.effects else np.log(P_UNKNOWN)
-        return own, [Hypothesis(known.fit, best, float(prior),
-                                known.log_evidence + gained + more,
+        return own, [Hypothesis(known.fit, best, float(prior), known.log_evidence + gained + more,
                                 Form((0.0,), (best.left,), self._free(known.fit, remainder, best)))]
 
     def _named(self, unknown: UnknownFit, beside: Hypothesis) -> bool:
