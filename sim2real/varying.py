@@ -1,10 +1,11 @@
 """A gap that no one size of any effect explains: an effect whose size is another elsewhere, or changes in time.
 
 Ice that grows, or a bias that wanders, is something unknown to all that has one size, and the same generic terms in
-time may follow it. Where something unknown is likeliest, alone or beside one effect, that one and every other that
-enters where it does are flown with a size for each stretch of every record; their departures from a common size are
-Gaussian (see `sim2real.by_stretch`), and what so many numbers take by luck they pay for. Where a second one so varying
-says it as well, no effect is told by it: what is known is that something there varies in time, and that is unknown.
+time may follow it. Where something unknown is likeliest, alone or beside one effect, that one, the likeliest of those
+alone and every other that enters where the unknown does are flown with a size for each stretch of every record; their
+departures from a common size are Gaussian (see `sim2real.by_stretch`), and what so many numbers take by luck they pay
+for. Where a second one so varying says it as well, no effect is told by it: what is known is that something there
+varies in time, and that is unknown.
 """
 
 from __future__ import annotations
@@ -68,8 +69,10 @@ def varying(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
     cuts = [cut_up(flight) for flight in flights]
     if len(tried := ways(flights, cuts)[1:]) == 0:  # one short record
         return posterior
+    alone = [h for h in posterior.hypotheses if h.unknown is None and len(h.effects) == 1]
+    likeliest = max(alone, key=lambda h: h.log_posterior).effects if alone else ()
     home = [f for f in unbroken(candidates.families) if f.effect.name in posterior.fits
-            and (best.unknown.component in f.effect.enters_at or f.effect.name in best.effects)]
+            and (best.unknown.component in f.effect.enters_at or f.effect.name in best.effects + likeliest)]
     flying = _Flying(flights, candidates, evidences, baseline, posterior.tempering, cuts, tried)
     found = [(f, flying.fitted(f, centre)) for f in home]
     nothing = float(posterior.reduced[0, 0])
