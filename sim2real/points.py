@@ -107,7 +107,7 @@ class Flying:
 
     def _descended(self, fit: SetFit, best: Point) -> Point:
         """The best that is reached with the slopes by nuisances as they are: two to four rows a flight."""
-        way = descent(fit, best)
+        way = descent(fit, best, self.worth(best))
         try:
             place = next(way)
             while True:
@@ -119,7 +119,7 @@ class Flying:
         """The same of many sets side by side, each from its own sizes and nuisances [n], with the slopes of `near`."""
         best = self.points([(fit, np.array(fit.estimate), start) for fit, start in zip(fits, starts, strict=True)])
         best = self._lower(fits, best)
-        ways = [descent(fit, point) for fit, point in zip(fits, best, strict=True)]
+        ways = [descent(fit, point, self.worth(point)) for fit, point in zip(fits, best, strict=True)]
         told: dict[int, Point | None] = dict.fromkeys(range(len(fits)))
         for _ in range(SIDE_BY_SIDE):
             waiting: dict[int, Place] = {}

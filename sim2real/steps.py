@@ -15,6 +15,7 @@ from sim2real.candidates import NUISANCE_STEP
 from sim2real.sets import SetFit
 
 ROUNDS, PATIENCE = 10, 2  # steps with the same slopes by nuisances, and those of them that need not help
+SHORTEST = 0.25  # share of a step that is tried before slopes by nuisances are flown anew
 SETTLED = 0.2  # gain of half the whitened square that is worth another step
 FARTHEST = 5.0  # standard deviations of a nuisance: what is beyond is no nuisance but a gap
 # Step of a size for its slope, in standard deviations, as nuisances' are. Where a size and a nuisance change the same
@@ -130,18 +131,21 @@ def step_from(fit: SetFit, point: Point) -> FloatArray:
     return bounded_step(point.information, point.slope, *rooms(fit, point, ranges(fit)))
 
 
-def descent(fit: SetFit, best: Point) -> Generator[Place, Point, Point]:
+def descent(fit: SetFit, best: Point, worth: float = SETTLED) -> Generator[Place, Point, Point]:
     """Yields sizes and nuisances to fly next and is sent what comes of it; returns the best.
+
+    Steps that promise less than `worth` (half the whitened square) are not taken.
 
     A size and the nuisance of the number that it changes make a narrow curved valley: a step along it climbs its
     side first, and the next leads down again. So a few steps need not help (the watchdog of Chamberlain, Powell,
-    Lemarechal and Pedersen, Mathematical Programming Study 16, 1982). When steps do not help, half as far.
+    Lemarechal and Pedersen, Mathematical Programming Study 16, 1982). When they do not help, half as far, and then
+    every one has to.
     """
     at, share, waited, span = best, 1.0, 0, ranges(fit)
     k = len(span)
     for _ in range(ROUNDS):
         step = share * step_from(fit, at)
-        if at is best and promised(at, step) < SETTLED:
+        if at is best and (share < SHORTEST or promised(at, step) < worth):
             break
         at = yield at.sizes + step[:k] * span, at.nuisances + step[k:]
         if at.cost < best.cost:
@@ -149,7 +153,7 @@ def descent(fit: SetFit, best: Point) -> Generator[Place, Point, Point]:
         elif waited < PATIENCE:
             waited += 1
         else:
-            at, share, waited = best, 0.5 * share, 0
+            at, share = best, 0.5 * share
     return best
 
 
