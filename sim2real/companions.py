@@ -14,7 +14,7 @@ from sim2real.steps import Point
 
 LEADING, LIKELY = 2, 0.02  # explanations that are flown again, and how probable they have to be
 CERTAIN = 0.05  # probability of no gap above which nothing is: sizes near zero have no likelihood of Gaussian shape
-COMPANIONS, WORTH = 2, 5.0  # effects flown beside the best single one, and the log evidence that they have to add
+COMPANIONS, LEAST_ADDED = 2, 5.0  # effects flown beside the best single one, and the log evidence that they have to add
 SUSPECTS = 2  # effects flown beside it because a nuisance went as far as it may
 
 
@@ -47,7 +47,7 @@ def companions(flying: Flying, linear: Posterior, first: SetFit, point: Point) -
                 if name not in best or fit.log_evidence > best[name].log_evidence:
                     best[name] = fit
         promising = sorted(best.values(), key=lambda fit: -fit.log_evidence)[:COMPANIONS]
-        out |= {fit.family.effect.name: fit for fit in promising if fit.log_evidence > WORTH}
+        out |= {fit.family.effect.name: fit for fit in promising if fit.log_evidence > LEAST_ADDED}
         out |= {name: best[name] for name in moving if name in best}
     return list(out.values())
 

@@ -14,7 +14,7 @@ from sim2real.sets import Modes, SetFit, integrate
 from sim2real.sizes import in_powers
 from sim2real.steps import Point, bounded_step, ranges, rooms
 
-DEPARTED = 100.0  # times the log likelihood that nothing at all loses, and some, beyond which a set does not fly
+LOST = 100.0  # times the log likelihood that nothing at all loses, and some, beyond which a set does not fly
 
 
 def inherited(found: Sequence[Hypothesis], before: Sequence[Hypothesis], bases: Iterable[int],
@@ -79,7 +79,7 @@ def corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior) -> Hyp
 
 def lost(point: Point, posterior: Posterior) -> bool:
     """Whether a set departs from flight where it settled: nothing at all is far nearer to the records."""
-    return point.cost > DEPARTED * (0.5 * float(posterior.reduced[0, 0]) + 1e4)
+    return point.cost > LOST * (0.5 * float(posterior.reduced[0, 0]) + 1e4)
 
 
 def _integrated(fit: SetFit, point: Point, cost: float, slope: FloatArray, information: FloatArray) -> SetFit:

@@ -36,7 +36,7 @@ BEYOND: dict[str, float] = {
     "Cn_alpha_beta": 0.02}  # fmt: skip
 # a matter of each record and its recorder
 FIXED = ("mass", "thrust", "filter_frequency", "vane_lag", "pitot_lag", "boom_gain")
-REPEATABLE = 0.2  # standard deviations: no number is known better for another flight (assumed; 1 %, 4 ms of a lag)
+REPEATABLE = 0.2  # standard deviations: no number is known better for another flight (assumed: 1 % of a derivative)
 LEAST = 1e-3  # of a published step: a number near zero has a nuisance that hardly moves it
 
 

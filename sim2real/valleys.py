@@ -19,7 +19,7 @@ from sim2real.sets import SetFit
 from sim2real.steps import FARTHEST, Place
 
 TRIED = 121  # sizes between the ends of a range
-WORTH = 0.5  # gain of log prior that makes another place worth a flight
+GAIN = 0.5  # gain of log prior that makes another place worth a flight
 
 
 def lowest(flight: Reconstruction, candidates: Bank, precision: FloatArray, fit: SetFit, place: Place) -> Place | None:
@@ -54,7 +54,7 @@ def _along_one(flight: Reconstruction, candidates: Bank, precision: FloatArray, 
     prior = 0.5 * np.einsum("si,ij,sj->s", whole, precision, whole)
     prior[np.any(np.abs(own) > FARTHEST, axis=1)] = np.inf
     best = int(np.argmin(prior))
-    if prior[best] > 0.5 * nuisances @ precision @ nuisances - WORTH:
+    if prior[best] > 0.5 * nuisances @ precision @ nuisances - GAIN:
         return place
     return tried[best], whole[best]
 
