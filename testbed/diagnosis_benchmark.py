@@ -186,7 +186,8 @@ def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[s
     """For people: the headline figures of all cases, of mismatched forms, and of answers dealt to the wrong cases."""
     headers = {"figure": "left", "all": "right", "95 %": "left", "other form": "right", "permuted": "right"}
     names = ("cases", "failed", "identifiable_singles", "top1", "top3", "null_false_alarm", "pair_exact_set",
-             "unknown_auroc_5_to_8", "unknown_auroc_above_8", "unknown_tpr_at_5_fpr", "where_f1", "ece", "coverage95",
+             "identifiable_pairs", "identifiable_pair_exact_set", "unknown_auroc_5_to_8",
+             "unknown_auroc_above_8", "unknown_tpr_at_5_fpr", "where_f1", "ece", "coverage95",
              "mean_set_size", "parameter_coverage95", "closure_median", "closure_p10", "oracle_fraction",
              "closure_own_median", "closure_own_p10", "oracle_fraction_own", "closure_told_median",
              "seconds_per_case")  # fmt: skip

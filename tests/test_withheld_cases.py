@@ -78,6 +78,28 @@ def test_every_effect_does_something_in_each_of_its_forms(pool, shape):
                 assert found.rivals[effect.name] < 0.1 * found.none + 0.2, effect.name
 
 
+def test_distances_of_a_pair_tell_it_from_every_other_set(shape):
+    parts = (("elevator_power", "same", -0.3), ("rudder_power", "same", 0.5))
+    found = separation.distances(0, 1.0, shape, parts)
+    assert found.own_set < 0.1 * found.none + 0.2 and found.pair == pytest.approx(found.own_set)
+    assert found.rival_set <= min(found.rivals.values())  # each alone, and every other pair
+    alone = [separation.distances(0, 1.0, shape, (part,)).none for part in parts]
+    assert found.rival_set < min(alone) + 0.2  # no farther than the smaller one by itself
+    single = separation.distances(0, 1.0, shape, parts[:1])
+    assert single.own_set is None and single.rival_set is None
+
+
+def test_the_nearest_pair_is_sought_among_all_of_them():
+    """One solve for every set gives what solving each by itself gives."""
+    own, to = 50.0, np.linspace(1.0, 3.0, 8)
+    among = np.diag(np.arange(4.0, 12.0)) + 0.3
+    at = np.array([[0, 1], [1, 3], [0, 2]])
+    found = separation._left(own, to, among, at)
+    for (i, j), d in zip(at, found, strict=True):
+        k = [2 * i, 2 * i + 1, 2 * j, 2 * j + 1]
+        assert d == pytest.approx((own - to[k] @ np.linalg.solve(among[np.ix_(k, k)], to[k])) ** 0.5, rel=1e-6)
+
+
 @pytest.mark.parametrize(("effect", "size", "derivatives"), [
     ("roll_damping", -0.3, 1), ("elevator_power", 0.25, 2), ("side_force", 0.5, 1)])  # fmt: skip
 def test_derivatives_stand_no_farther_from_none_than_their_spread_allows(effect, size, derivatives, shape):

@@ -90,6 +90,19 @@ def test_identifiable_means_that_the_own_name_is_nearest():
     assert not score.identifiable(key("single", ["effect_1"], 0.0, none=40.0, D=bent))
 
 
+def test_a_pair_is_identifiable_where_no_other_set_comes_as_near():
+    pair = ["effect_1", "effect_2"]
+    assert score.identifiable(key("pair", pair, 0.0, D_own_set=1.0, D_rival_set=5.2))
+    assert not score.identifiable(key("pair", pair, 0.0, D_own_set=12.0, D_rival_set=12.9))  # another form than ours
+    assert not score.identifiable(key("pair", pair, 0.0))  # a key that does not tell
+    assert not score.identifiable(key("unknown", ["never"], 0.0, D_own_set=None, D_rival_set=None))
+    told = [(answer(pair), key("pair", pair, 0.0, D_own_set=0.0, D_rival_set=r)) for r in (6.0, 2.0)]
+    told.append((answer(["effect_1"]), key("pair", pair, 0.0, D_own_set=0.0, D_rival_set=6.0)))
+    found = score.figures([score.flat(*one) for one in told])
+    assert found["identifiable_pairs"] == 2 and found["identifiable_pair_exact_set"] == 0.5
+    assert found["pair_exact_set"] == pytest.approx(2.0 / 3.0) and found["identifiable_singles"] == 0
+
+
 def test_a_refused_record_is_wrong_and_counted():
     case = score.flat({"error": "no"}, key("null", [], 0.0))
     assert case["alarm"] and case["failed"] and not case["top3"] and not case["covered"]

@@ -181,7 +181,7 @@ def _key(name: str, design: Design, parts: Parts, found: Distances) -> dict[str,
         "effects": [effect for effect, _, _ in parts], "forms": [form for _, form, _ in parts],
         "parameters": {effect: {CATALOGUE[effect].parameter: size} for effect, _, size in parts},
         "where": where, "D_none": found.none, "D": found.rivals, "D_pair": found.pair,
-        "fault": fault,
+        "D_own_set": found.own_set, "D_rival_set": found.rival_set, "fault": fault,
         "design": {k: v for k, v in asdict(design).items() if k not in ("tier", "parts", "fault")},
     }  # fmt: skip
 

@@ -44,10 +44,7 @@ def load(answers: Path, keys: Path, refly: Path | None = None) -> list[Case]:
 
 
 def flat(answer: dict[str, Any], key: dict[str, Any], flown: dict[str, Any] | None = None) -> Case:
-    """What the figures need of one answer and its key. An answer {"error": ...} is wrong everywhere.
-
-    `flown`: gaps on held-out records of the answer's model, by the generator's plant.
-    """
+    """What the figures need of one answer ({"error": ...} is wrong everywhere), its key, its model's gaps reflown."""
     hypotheses = sorted(answer.get("hypotheses", []), key=lambda h: -h["probability"])
     truth = (frozenset(() if key["tier"] == "unknown" else key["effects"]), key["tier"] == "unknown")
     listed = [_label(h) for h in hypotheses]
@@ -116,12 +113,15 @@ def _label(hypothesis: dict[str, Any]) -> tuple[frozenset[str], bool]:
 
 
 def identifiable(key: dict[str, Any]) -> bool:
-    """Whether an ideal observer could name the single effect: it stands out, and nearer to its name than to others."""
-    if key["tier"] != "single" or key["D_none"] < DETECTABLE:
-        return False
-    own = key["D"][key["effects"][0]]
-    rival = min(d for name, d in key["D"].items() if name not in key["effects"])
-    return bool(rival**2 - own**2 >= APART**2)
+    """Whether an ideal observer could name one effect or a pair: it stands out, nearer to its name than to others.
+
+    Others are single effects, and all pairs where it is one. Keys of before 24 November 2026 do not tell of pairs.
+    """
+    own, rival = key.get("D_own_set") or 0.0, key.get("D_rival_set") or 0.0
+    if key["tier"] == "single":
+        own = key["D"][key["effects"][0]]
+        rival = min(d for name, d in key["D"].items() if name not in key["effects"])
+    return key["D_none"] >= DETECTABLE and bool(rival**2 - own**2 >= APART**2)
 
 
 def _in_class(answer: dict[str, Any], first: tuple[frozenset[str], bool], key: dict[str, Any]) -> bool:
@@ -198,7 +198,7 @@ def f1(cases: Sequence[Case]) -> float | None:
 
 def figures(cases: Sequence[Case]) -> dict[str, Any]:
     """The figures of the interface for a set of cases; None where it holds none of the kind."""
-    clear = [c for c in cases if c["identifiable"]]
+    clear, pairs = ([c for c in cases if c["identifiable"] and c["tier"] == tier] for tier in ("single", "pair"))
     nulls = [c for c in cases if c["tier"] == "null"]
     beyond = _unknown(cases, APART, math.inf)
     closures = [c["closure_told"] for c in cases if c["tier"] in ("single", "pair") and c["closure_told"] is not None]
@@ -209,6 +209,7 @@ def figures(cases: Sequence[Case]) -> dict[str, Any]:
         "top1_by_gust": {f"{s:g}": share([c["top1"] for c in clear if c["sigma"] == s]) for s in (0.0, 0.5, 1.5)},
         "null_false_alarm": share([c["alarm"] for c in nulls]),
         "pair_exact_set": share([c["exact"] for c in cases if c["tier"] == "pair"]),
+        "identifiable_pairs": len(pairs), "identifiable_pair_exact_set": share([c["exact"] for c in pairs]),
         "unknown_auroc_5_to_8": auroc(*_unknown(cases, APART, 8.0)),
         "unknown_auroc_above_8": auroc(*_unknown(cases, 8.0, math.inf)),
         "unknown_tpr_at_5_fpr": tpr_at(*beyond), "where_f1": f1(cases), "ece": calibration_error(cases),
@@ -251,15 +252,12 @@ def _shares(cases: Sequence[Case], right: str, *others: str) -> dict[str, Any]:
 
 
 def by_tier(cases: Sequence[Case], without: Sequence[Case]) -> dict[str, Any]:
-    """What each tier shows by itself; every effect's recall under "single"; "faults" and "without" where there are any.
-
-    `without`: answers to single effects that the library lacked, right where unknown or a rival within D of SAME.
-    """
+    """Each tier by itself, with every effect's recall; `without`: right where unknown or a rival within D of SAME."""
     of = {tier: [c for c in cases if c["tier"] == tier] for tier in ("null", "single", "pair", "unknown", "faults")}
     rules = {"null": "silent", "single": "top1", "pair": "exact", "unknown": "exact"}
     tiers = {tier: _shares(of[tier], rule) | {"detectable": sum(c["none"] >= DETECTABLE for c in of[tier])}
              for tier, rule in rules.items()}  # fmt: skip
-    clear = [c for c in cases if c["identifiable"]]
+    clear = [c for c in cases if c["identifiable"] and c["tier"] == "single"]
     names = sorted({c["effects"][0] for c in clear})
     tiers["single"]["recall"] = {n: share([c["top1"] for c in clear if c["effects"] == (n,)]) for n in names}
     if of["faults"]:

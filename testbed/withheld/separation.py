@@ -8,8 +8,9 @@ little more: distances to strongly curved rivals are rather too small).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,6 @@ MASS_SPREAD = MASS_RANGE / 3**0.5  # of a uniform distribution
 NUISANCES = (*((name, 1.0 + SPREAD) for name in DERIVATIVES if name != "Cn_aileron"), ("mass", 1.0 + MASS_SPREAD))
 RIVALS = tuple(effect.name for effect in effects.EFFECTS)
 SIZES = (0.9, 1.8)  # of the typical size, the same sign
-FEW = 12  # nearest rivals from which pairs are made, each with every other
 Part = tuple[str, str, float]
 
 
@@ -91,11 +91,16 @@ def _clear(y: NDArray, starts: NDArray) -> NDArray:
 
 @dataclass(frozen=True)
 class Distances:
-    """D from none; from each library effect, its size free; from the nearest and (nearest) pair."""
+    """D from none; from each library effect, its size free; from the nearest pair of them.
+
+    own_set, rival_set: of a pair, from itself in the library's forms, and from the nearest other pair or single effect.
+    """
 
     none: float
     rivals: dict[str, float]
     pair: float
+    own_set: float | None = None
+    rival_set: float | None = None
 
 
 def distances(plan: int, gain: float, g: Geometry, parts: Sequence[Part]) -> Distances:
@@ -113,15 +118,22 @@ def distances(plan: int, gain: float, g: Geometry, parts: Sequence[Part]) -> Dis
     own = float(total - cross[:k] @ prior @ cross[:k])
     to = cross[k:] - g.gram[k:, :k] @ prior @ cross[:k]
     among = g.gram[k:, k:] - g.gram[k:, :k] @ prior @ g.gram[:k, k:]
-    singles = {name: _left(own, to, among, (i,)) for i, name in enumerate(RIVALS)}
-    nearest = sorted(range(len(RIVALS)), key=lambda i: singles[RIVALS[i]])
-    pairs = [_left(own, to, among, (i, j)) for i in nearest[:FEW] for j in range(len(RIVALS)) if i != j]
-    return Distances(max(own, 0.0) ** 0.5, singles, min(pairs))
+    singles = dict(zip(RIVALS, _left(own, to, among, np.arange(len(RIVALS))[:, None]).tolist(), strict=True))
+    chosen = np.array(list(combinations(range(len(RIVALS)), 2)))
+    pairs = _left(own, to, among, chosen)
+    found = Distances(max(own, 0.0) ** 0.5, singles, float(pairs.min()))
+    names = {effect for effect, _, _ in parts}
+    if len(names) < 2 or not names <= set(RIVALS):
+        return found
+    itself = np.array([{RIVALS[i], RIVALS[j]} == names for i, j in chosen])
+    return replace(found, own_set=float(pairs[itself][0]),
+                   rival_set=min(float(pairs[~itself].min()), *singles.values()))
 
 
-def _left(own: float, to: NDArray, among: NDArray, chosen: tuple[int, ...]) -> float:
-    """Distance that remains when the chosen rivals take any size."""
-    at = [len(SIZES) * i + j for i in chosen for j in range(len(SIZES))]
-    block = among[np.ix_(at, at)]
-    block = block + np.diag(1e-9 * np.diag(block) + 1e-9)
-    return max(own - float(to[at] @ np.linalg.solve(block, to[at])), 0.0) ** 0.5
+def _left(own: float, to: NDArray, among: NDArray, chosen: NDArray) -> NDArray:
+    """Distances [sets] that remain when the chosen rivals [sets, members] take any size."""
+    at = (len(SIZES) * chosen[:, :, None] + np.arange(len(SIZES))).reshape(len(chosen), -1)
+    block = among[at[:, :, None], at[:, None, :]]
+    block = block + np.eye(at.shape[1]) * (1e-9 * block + 1e-9)
+    explained = np.einsum("sk,sk->s", to[at], np.linalg.solve(block, to[at][..., None])[..., 0])
+    return np.asarray(np.maximum(own - explained, 0.0) ** 0.5)
