@@ -172,17 +172,17 @@ def advance(block: Any, states: Any, parameters: Any, speeds: Any, count: int, d
 
 
 @entry
-def along(table: Any, controls: Any, first: Any, measured: Any, stretch: Any, gain: Any, force_at: Any,
+def along(table: Any, controls: Any, first: Any, last: Any, measured: Any, stretch: Any, gain: Any, force_at: Any,
           force: Any, error_at: Any, error: Any, known: Any, out: Any) -> None:
-    """Fly the rows of a fleet (`table`: of `Fleet.table`) along a record, LANES at a time to its end.
+    """Fly the rows of a fleet (`table`: of `Fleet.table`) along records put end to end, LANES at a time.
 
     Nothing draws noise but gusts with an intensity above STILL; ice stays as it is.
 
     Args:
         controls: [N, CONTROLS].
-        first: sample at which each row starts [n].
+        first, last: samples at which each row starts, and the last of its own record, where it stays [n].
         measured: [N, channels of MEASURED], nan where nothing was measured.
-        stretch: by which a fed-back channel's error is multiplied [FED_BACK].
+        stretch: by which a fed-back channel's error is multiplied [n, FED_BACK].
         gain: [1 or n, steps, FED_BACK, states then roll and pitch] of the record's steps, the last one's goes on; empty
             for free flight.
         force_at, force: (row, state) of what is added to states [F, 2], and how much at each sample [F, N].
@@ -208,10 +208,11 @@ def along(table: Any, controls: Any, first: Any, measured: Any, stretch: Any, ga
         for k in range(len(out)):
             for j in range(count):
                 i = at + j
-                steer(x[i], u[i], controls[first[i] + k], controls[first[i] + k + 1])
+                now = min(first[i] + k, last[i] - 1)
+                steer(x[i], u[i], controls[now], controls[now + 1])
                 fill(block, AT_COMMAND, j, u[i])
                 for c in range(6 if len(known) > 0 else 0):
-                    x[i, X[c]] += known[first[i] + k + 1, c]*clock.dt
+                    x[i, X[c]] += known[now + 1, c]*clock.dt
                 if k % PRESENTED == 0:
                     present_aircraft(states[i], parameters[i], currents[i])
                     fill(block, AT_CURRENT, j, held[i])
@@ -222,15 +223,18 @@ def along(table: Any, controls: Any, first: Any, measured: Any, stretch: Any, ga
                 sense(states[i], readings[i], currents[i], parameters[i], recall_loads(block, j),
                       clock.dt)
                 read(out[k, i], x[i], y[i], p[i])
+                now = min(first[i] + k, last[i] - 1)
                 for c in range(3 if len(known) > 0 else 0):
-                    out[k, i, _FELT[c]] += known[first[i] + k + 1, c]
+                    out[k, i, _FELT[c]] += known[now + 1, c]
             for j in range(len(error)):
-                if at <= error_at[j, 0] < at + count:
-                    out[k, error_at[j, 0], error_at[j, 1]] += error[j, first[error_at[j, 0]] + k + 1]
+                i = error_at[j, 0]
+                if at <= i < at + count:
+                    out[k, i, error_at[j, 1]] += error[j, min(first[i] + k, last[i] - 1) + 1]
             for i in range(at, at + count if len(gain) > 0 else at):
-                at_sample = first[i] + k
-                own = gain[i if len(gain) > 1 else 0, min(at_sample, gain.shape[1] - 1)]
-                correct(x[i], y[i, _PHI], out[k, i], measured[at_sample + 1], stretch, own, fed, change)
+                now = min(first[i] + k, last[i] - 1)
+                own = gain[i if len(gain) > 1 else 0, min(now, gain.shape[1] - 1)]
+                correct(x[i], y[i, _PHI], out[k, i], measured[now + 1], stretch[i], own, fed, change)
             for j in range(len(force)):
-                if at <= force_at[j, 0] < at + count:
-                    x[force_at[j, 0], force_at[j, 1]] += force[j, first[force_at[j, 0]] + k + 1]
+                i = force_at[j, 0]
+                if at <= i < at + count:
+                    x[i, force_at[j, 1]] += force[j, min(first[i] + k, last[i] - 1) + 1]

@@ -99,10 +99,28 @@ def compare(flight: Reconstruction, rows: NDArray, gain: Gain, factor: FloatArra
 def flown(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain: Gain, factor: FloatArray,
           keep: Sequence[int] = (), linear: Responses = NONE) -> Evidence:
     """The same but for the paths, which do not care how the aircraft flies."""
-    moved = flown_rows(flight, rows, {q.row for q in pushed})
-    index = {row: i for i, row in enumerate([*moved, *linear.rows])}
-    renamed = tuple(replace(q, row=index[q.row]) for q in pushed)
+    moved, renamed = to_fly(flight, rows, pushed)
     left = with_spare(flight, rows[moved], gain.K, renamed)
+    return told(flight, left, moved, len(rows), gain, factor, keep, linear)
+
+
+def to_fly(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...] = ()) -> tuple[list[int],
+                                                                                         tuple[Push, ...]]:  # fmt: skip
+    """Which rows have to be flown, and what pushes these, by their place among them."""
+    moved = flown_rows(flight, rows, {q.row for q in pushed})
+    index = {row: i for i, row in enumerate(moved)}
+    return moved, tuple(replace(q, row=index[q.row]) for q in pushed)
+
+
+def told(flight: Reconstruction, left: FloatArray, moved: Sequence[int], count: int, gain: Gain, factor: FloatArray,
+         keep: Sequence[int] = (), linear: Responses = NONE) -> Evidence:
+    """What innovations tell.
+
+    Args:
+        left: innovations of the rows `moved`, of `count` in all, perhaps with more behind them [N-1, rows, channels].
+        keep, linear: as for `compare`.
+    """
+    index = {row: i for i, row in enumerate([*moved, *linear.rows])}
     first = round(SETTLE / flight.dt)
     inner, samples = np.zeros((len(index), len(index))), 0.0
     whitened = np.zeros((len(left), len(MEASURED)))
@@ -123,7 +141,7 @@ def flown(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain:
         inner -= means.energy()
         kept[:, at[:, 0]] -= means.over_time(at[:, 1].tolist())
         whitened[first:] -= means.over_time([0]).reshape(-1, len(MEASURED))
-    gram = np.zeros((len(rows), len(rows)))
+    gram = np.zeros((count, count))
     gram[np.ix_([*index], [*index])] = inner
     return Evidence(gram, gain, factor, samples, whitened, flight, kept)
 

@@ -24,7 +24,7 @@ from sim2real.channels import SURFACES
 from sim2real.instruments import UNFILTERED
 from sim2real.noise import white
 from sim2real.reconstruct import Reconstruction
-from sim2real.terms import Term, path_course
+from sim2real.terms import Term, path_courses
 
 POSITION_NOISE = 5.2e-4  # rad, the least believed (0.03 deg)
 AROUND = 5  # samples about one, where a command of doubtful timing moves
@@ -49,7 +49,8 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
         command = flight.commands[f"{surface}_command"]
         predicted = follow(command, measured[good][0], parameters[rows], surface, flight.dt)
         own = [term for term in terms if term.component == f"{surface}_path"]
-        added = [predicted[:, 0] + path_course(flight, predicted[:, 0], term.name) for term in own]
+        courses = path_courses(flight, predicted[:, 0], [term.name for term in own])
+        added = [predicted[:, 0] + course for course in courses]
         left = np.where(good[:, None], measured[:, None] - np.column_stack([predicted, *added]), 0.0)
         out.append((f"{surface}_path", _believed(flight, surface, left), rows + [term.row for term in own]))
     return out + _engine_residuals(flight, parameters)
@@ -64,12 +65,22 @@ def moves(flight: Reconstruction, surface: str) -> bool:
 
 def _believed(flight: Reconstruction, surface: str, left: FloatArray) -> FloatArray:
     """What is left of a surface's positions [N, rows] over its noise: sample by sample, and a delay that lasts."""
-    rate, noise = position_noise(flight, surface)
-    over = left / noise[:, None]
-    delay = (flight.timing * rate / noise)[:, None] * np.any(left != 0.0, axis=1)[:, None]
-    square = float(np.sum(delay**2))
-    share = (1.0 - 1.0 / np.sqrt(1.0 + square)) / max(square, 1e-12)
+    noise, delay, share = flight.once(("late", surface), lambda: _late(flight, surface))
+    over = left / noise
     return np.asarray(over - share * delay * (delay.T @ over))
+
+
+def _late(flight: Reconstruction, surface: str) -> tuple[FloatArray, FloatArray, float]:
+    """Noise of a surface's samples, what a delay makes of them over that, and how much of it is taken [N, 1], [N, 1].
+
+    All rows start where the surface was recorded: no delay shows in a first sample.
+    """
+    rate, noise = position_noise(flight, surface)
+    there = np.isfinite(flight.positions[surface])
+    there[0] = False
+    delay = flight.timing * rate / noise * there
+    square = float(np.sum(delay**2))
+    return noise[:, None], delay[:, None], (1.0 - 1.0 / np.sqrt(1.0 + square)) / max(square, 1e-12)
 
 
 def position_noise(flight: Reconstruction, surface: str) -> tuple[FloatArray, FloatArray]:
@@ -78,6 +89,10 @@ def position_noise(flight: Reconstruction, surface: str) -> tuple[FloatArray, Fl
     Of the record alone: what noise is believed must not depend on the row that stands first. Samples count as if they
     were CORRELATED apart.
     """
+    return flight.once(("position noise", surface), lambda: _position_noise(flight, surface))
+
+
+def _position_noise(flight: Reconstruction, surface: str) -> tuple[FloatArray, FloatArray]:
     measured, good = flight.positions[surface], np.isfinite(flight.positions[surface])
     rate = np.gradient(np.interp(flight.time, flight.time[good], measured[good]), flight.dt)
     noise = np.hypot(max(POSITION_NOISE, white(measured)), flight.timing * maximum_filter1d(np.abs(rate), AROUND))
@@ -178,23 +193,32 @@ def driven(flight: Reconstruction, parameters: NDArray, paths: Collection[str]) 
 def _engine_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple[str, FloatArray, list[int]]]:
     if flight.power_from != "torque":
         return []
+    rows = _differing(parameters, ["spool_time"])
+    lags = parameters["spool_time"][rows]
+    if len(rows) > 1:
+        return [("propulsion", left, rows) for left in _engines_left(flight, lags)]
+    known = flight.once(("engines", float(lags[0])), lambda: _engines_left(flight, lags))
+    return [("propulsion", left, rows) for left in known]
+
+
+def _engines_left(flight: Reconstruction, lags: FloatArray) -> list[FloatArray]:
+    """What engines with spools of some lags leave, by side [N, lags]."""
     out = []
     full = full_power(flight.altitude, flight.parameters)
-    rows = _differing(parameters, ["spool_time"])
-    share = 1.0 - np.exp(-flight.dt / parameters["spool_time"][rows])
+    share = 1.0 - np.exp(-flight.dt / lags)
     for side in ("left", "right"):
         lever = flight.commands.get(f"throttle_{side}")
         if lever is None or np.ptp(lever) < STILL_LEVER:
             continue
-        power = np.full(len(rows), flight.controls[f"power_{side}"][0])
+        power = np.full(len(lags), flight.controls[f"power_{side}"][0])
         wanted = full * np.clip(lever, 0.0, 1.0)
-        found = np.empty((len(lever), len(rows)))
+        found = np.empty((len(lever), len(lags)))
         found[0] = power
         for j, s in enumerate(share):
             found[1:, j] = lfilter([s], [1.0, s - 1.0], wanted[1:], zi=[(1.0 - s) * power[j]])[0]
         left = (flight.controls[f"power_{side}"][:, None] - found) / full[:, None]
         # the chart between lever and power is nobody's claim: a constant share and an offset are taken out
-        out.append(("propulsion", _without_line(left, lever) / (POWER_NOISE * _weight(flight)), rows))
+        out.append(_without_line(left, lever) / (POWER_NOISE * _weight(flight)))
     return out
 
 

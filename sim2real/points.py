@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 from icing_env import effects
 from icing_env.record import FloatArray
+from sim2real.abreast import Abreast, end_to_end
 from sim2real.attribution import reduce, with_prior
 from sim2real.candidates import NUISANCE_STEP, Bank, parameter_rows
 from sim2real.courses import Course, Courses, Remainder, in_time
-from sim2real.evidence import SETTLE, Evidence, compare, flown
+from sim2real.evidence import SETTLE, Evidence, compare, to_fly, told
 from sim2real.paths import PATHS, excess, of_paths, path_gram
+from sim2real.predictor import Push
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
 from sim2real.sets import SetFit, firm
@@ -97,6 +99,20 @@ class Flying:
         return min(best, self.point(fit, *place, best.slopes), key=lambda point: point.cost)
 
     @cached_property
+    def _abreast(self) -> Abreast:
+        return Abreast(self.flights, [e.gain for e in self.evidences])
+
+    def _flown(self, rows: Sequence[NDArray], pushed: Sequence[tuple[Push, ...]] = (),
+               keep: Sequence[int] = ()) -> list[Evidence]:  # fmt: skip
+        """What rows flown along the records abreast tell, but for the paths; as `evidence.flown` does for one."""
+        chosen = [to_fly(f, own, pushes)
+                  for f, own, pushes in zip(self.flights, rows, pushed or [()] * len(rows), strict=True)]
+        made = self._abreast.innovations([own[moved] for own, (moved, _) in zip(rows, chosen, strict=True)],
+                                         [pushes for _, pushes in chosen])
+        return each(lambda flight, left, which, own, e: told(flight, left, which[0], len(own), e.gain, e.factor, keep),
+                    self.flights, made, chosen, rows, self.evidences)
+
+    @cached_property
     def near(self) -> list[Slopes]:
         """Slopes by nuisances where the variants were flown."""
         return self._slopes([e.rows[:, : len(self.candidates.nuisances)] / NUISANCE_STEP for e in self.evidences])
@@ -156,8 +172,7 @@ class Flying:
         steps = size_steps(fit, sizes)
         gram, count = np.zeros((1 + k + n, 1 + k + n)), 1 + k if slopes else 1 + k + n
         rows = [_rows(f, self.candidates, fit, sizes, steps, nuisances)[:count] for f in self.flights]
-        made = each(lambda flight, own, e: flown(flight, own, (), e.gain, e.factor, keep=range(count)).rows,
-                    self.flights, rows, self.evidences)
+        made = [e.rows for e in self._flown(rows, keep=range(count))]
         slopes = slopes or self._slopes([own[:, 1 + k :] / NUISANCE_STEP for own in made])
         made = [own[:, : 1 + k] for own in made]
         for flight, own, left, lent in zip(self.flights, rows, made, slopes, strict=True):
@@ -181,16 +196,16 @@ class Flying:
             own[np.arange(first + 1, after), np.arange(first, after - 1)] = 1.0
             own[first, first : after - 1] = -1.0
 
-        def of_record(flight: Reconstruction, e: Evidence, lent: Slopes) -> FloatArray:
-            rows = np.concatenate([flight.parameters, *(
-                _rows(flight, self.candidates, fit, sizes, size_steps(fit, sizes), nuisances)[: 1 + len(sizes)]
-                for fit, sizes, nuisances in sets)])
-            made = flown(flight, rows, (), e.gain, e.factor, keep=range(count))
+        def of_record(flight: Reconstruction, rows: NDArray, made: Evidence, lent: Slopes) -> FloatArray:
             inner = made.gram + path_gram(flight, rows, (), round(SETTLE / flight.dt))
             across = own.T @ (made.rows.T @ lent.rows)
             return np.asarray(np.block([[own.T @ inner @ own, across], [across.T, lent.inner]]))
 
-        total = np.sum(each(of_record, self.flights, self.evidences, self.near), axis=0) / self.tempering
+        rows = [end_to_end([flight.parameters, *(
+            _rows(flight, self.candidates, fit, sizes, size_steps(fit, sizes), nuisances)[: 1 + len(sizes)]
+            for fit, sizes, nuisances in sets)]) for flight in self.flights]
+        made = self._flown(rows, keep=range(count))
+        total = np.sum(each(of_record, self.flights, rows, made, self.near), axis=0) / self.tempering
         out = []
         for (fit, sizes, nuisances), first, after in zip(sets, at, at[1:], strict=False):
             chosen = np.r_[first - 1 : after - 1, count - 1 : count - 1 + n]
@@ -224,14 +239,13 @@ class Flying:
         moved = tuple(replace(term, row=first + j) for j, term in enumerate(terms))
         gram, kept, left_in = np.zeros((first + len(terms),) * 2), [], dict.fromkeys(PATHS, 0.0)
         pushed = self.courses.pushed(terms, point.weights, 1 + k)
-        for i, (flight, evidence, (generic, inner), pushes) in enumerate(zip(
-                self.flights, self.evidences, self.courses.of_terms(terms), pushed, strict=True)):
-            rows = _rows(flight, self.candidates, fit, point.sizes, point.steps, point.nuisances)[: 1 + k]
+        moved_to = [_rows(flight, self.candidates, fit, point.sizes, point.steps, point.nuisances)[: 1 + k]
+                    for flight in self.flights]
+        made = [e.rows for e in self._flown(moved_to, pushed, range(1 + k))] if point.weights else point.rows
+        for flight, rows, own, slopes, (generic, inner) in zip(
+                self.flights, moved_to, made, point.slopes, self.courses.of_terms(terms), strict=True):
             for component, over in excess(flight, rows[:1]).items():
                 left_in[component] += over / self.tempering
-            own, slopes = point.rows[i], point.slopes[i]
-            if point.weights:
-                own = flown(flight, rows, pushes, evidence.gain, evidence.factor, keep=range(1 + k)).rows
             across = np.concatenate([own.T @ generic, slopes.onto])
             gram += np.block([[slopes.beside(own), across], [across.T, inner]]) / self.tempering
             rows = np.take(rows, [*range(1 + k), *[0] * (n + len(terms))])

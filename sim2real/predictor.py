@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import llvmlite.binding
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,7 +25,8 @@ from sim2real.along import CONTROLS, SLOW_SURFACE, STATES, STILL, X, along, colu
 from sim2real.channels import FED_BACK, MEASURED, SURFACES
 from sim2real.reconstruct import Reconstruction
 
-QUICK = 4  # rows at a time that the compiler turns into vector instructions
+# rows at a time that the compiler turns into vector instructions: as many as a register of the processor holds
+QUICK = 8 if llvmlite.binding.get_host_cpu_features().get("avx512f") else 4
 LOST = 1e9  # what a row that flew to no numbers is off by, in any unit
 ANGLES = ("phi", "theta")  # corrected through the quaternion
 TANGENT = (*STATES, *ANGLES)
@@ -81,16 +83,12 @@ class Predictor:
         """
         flight = self.flight
         out = np.empty((steps, self.n, len(MEASURED)))
-        controls = np.column_stack([flight.controls[name] for name in CONTROLS])
         start = np.full(self.n, first, np.intp) if isinstance(first, int) else np.asarray(first, np.intp)
         K = np.zeros((0, 0, 0, 0)) if gain is None else gain[None] if gain.ndim == 3 else gain
-        stretch = np.max(seen(flight), axis=0, initial=1.0)[:FED_BACK]
-        forces = [(q.row, X[STATES.index(q.target)], q.series * flight.dt) for q in pushes if not q.sensor]
-        felt = [(q.row, MEASURED.index("a" + "xyz"["uvw".index(q.target)]), q.series) for q in pushes
-                if not q.sensor and q.target in "uvw"]  # fmt: skip
-        errors = felt + [(q.row, MEASURED.index(q.target), q.series) for q in pushes if q.sensor]
-        along(self.fleet.table(), controls, start, np.ascontiguousarray(flight.measured), stretch,
-              np.ascontiguousarray(np.swapaxes(K, 2, 3)), *_listed(forces), *_listed(errors),
+        forces, errors = listed(pushes, flight.dt)
+        along(self.fleet.table(), steered(flight), start, np.full(self.n, len(flight.time) - 1),
+              np.ascontiguousarray(flight.measured), np.tile(stretch(flight), (self.n, 1)),
+              np.ascontiguousarray(np.swapaxes(K, 2, 3)), *forces, *errors,
               np.zeros((0, 6)) if flight.known is None else flight.known, out)
         return out
 
@@ -123,8 +121,29 @@ def seen(flight: Reconstruction) -> FloatArray:
     return np.asarray(there / np.maximum(np.mean(there, axis=0), 1e-3))
 
 
-def _listed(items: list[tuple[int, int, FloatArray]]) -> tuple[NDArray[np.intp], FloatArray]:
-    """(row, column) of each [items, 2] and their series [items, N]."""
+def stretch(flight: Reconstruction) -> FloatArray:
+    """By which a fed-back channel's error is multiplied where it was sampled: the sparser, the more [FED_BACK]."""
+    return np.asarray(np.max(seen(flight), axis=0, initial=1.0)[:FED_BACK])
+
+
+def steered(flight: Reconstruction) -> FloatArray:
+    """Controls along a record [N, CONTROLS]."""
+    return np.column_stack([flight.controls[name] for name in CONTROLS])
+
+
+Listed = tuple[NDArray[np.intp], FloatArray]  # (row, column) of each [items, 2] and their series [items, N]
+
+
+def listed(pushes: Sequence[Push], dt: float) -> tuple[Listed, Listed]:
+    """What is added to states in every step, and to readings."""
+    forces = [(q.row, int(X[STATES.index(q.target)]), q.series * dt) for q in pushes if not q.sensor]
+    felt = [(q.row, MEASURED.index("a" + "xyz"["uvw".index(q.target)]), q.series) for q in pushes
+            if not q.sensor and q.target in "uvw"]  # fmt: skip
+    errors = felt + [(q.row, MEASURED.index(q.target), q.series) for q in pushes if q.sensor]
+    return _listed(forces), _listed(errors)
+
+
+def _listed(items: list[tuple[int, int, FloatArray]]) -> Listed:
     at = np.array([item[:2] for item in items], np.intp).reshape(-1, 2)
     return at, np.array([item[2] for item in items], np.float64) if items else np.zeros((0, 0))
 
@@ -200,10 +219,14 @@ def with_spare(flight: Reconstruction, parameters: NDArray, gain: FloatArray,
                pushes: tuple[Push, ...] = ()) -> FloatArray:
     """The same, more rows behind those asked for where two or three beside full lanes would take longer than four."""
     count = len(parameters)
-    spare = -count % QUICK if count % QUICK > 1 and gain.ndim == 3 else 0
-    flown = Predictor(flight, np.take(parameters, [*range(count), *[count - 1] * spare]))
+    flown = Predictor(flight, np.take(parameters, [*range(count), *[count - 1] * (spare(count) * (gain.ndim == 3))]))
     flown.place(0)
     return lost(flown.fly(len(flight.time) - 1, gain=gain, pushes=pushes), np.isfinite(flight.measured[1:]))
+
+
+def spare(count: int) -> int:
+    """Rows beside `count` that fill the last lanes, where that is quicker than flying it one by one."""
+    return -count % QUICK if count % QUICK > 0.4 * QUICK else 0
 
 
 def lost(left: FloatArray, known: NDArray[np.bool_]) -> FloatArray:

@@ -7,7 +7,9 @@ kept in `notes`.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +27,7 @@ from sim2real.powers import powers
 
 LONGEST_STEP, SHORTEST_STEP = 0.1, 0.018  # s: records are 10 to 200 Hz; faster ones are thinned to about 50 Hz
 TIMING = 0.002  # s: command and position are no better in step, nor is the actuator exactly of first order (assumed)
+T = TypeVar("T")
 LONGITUDINAL = ("airspeed", "alpha", "q", "theta", "ax", "az", "elevator")
 
 
@@ -72,6 +75,7 @@ class Reconstruction:
         reach: root mean square of the generic terms' time courses, by name, where above one.
         inadequacy: of the model.
         timing: s, how sharply it is known when commands act.
+        kept: what others have made of this record and would make again, by what it is; a changed record begins anew.
     """
 
     name: str
@@ -94,14 +98,23 @@ class Reconstruction:
     reach: dict[str, float] = field(default_factory=dict)
     inadequacy: Inadequacy = Inadequacy()
     timing: float = TIMING
+    kept: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def channel(self, name: str) -> FloatArray:
         """One column of `measured`, gaps filled by interpolation; zeros where it was not recorded."""
-        values = self.measured[:, MEASURED.index(name)]
+        return self.once(("channel", name), lambda: self._filled(self.measured[:, MEASURED.index(name)]))
+
+    def _filled(self, values: FloatArray) -> FloatArray:
         good = np.isfinite(values)
         if not good.any():
             return np.zeros(len(values))
         return np.interp(self.time, self.time[good], values[good])
+
+    def once(self, what: Any, make: Callable[[], T]) -> T:
+        """What `make` makes of the record, made once; `what` names it."""
+        if what not in self.kept:
+            self.kept[what] = make()
+        return self.kept[what]  # type: ignore[no-any-return]
 
     def has(self, name: str) -> bool:
         """Whether the channel was recorded."""

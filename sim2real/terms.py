@@ -122,15 +122,18 @@ def _thrust_pushes(flight: Reconstruction, term: Term) -> list[Push]:
     return out
 
 
-def path_course(flight: Reconstruction, position: FloatArray, name: str) -> FloatArray:
-    """What a generic term adds to a surface's predicted position [rad]; loads push it by what the air does."""
+def path_courses(flight: Reconstruction, position: FloatArray, names: Sequence[str]) -> list[FloatArray]:
+    """What generic terms add to a surface's predicted position [rad]; loads push it by what the air does."""
+    if not names:
+        return []
     rate = np.gradient(position, flight.dt)
     reach = max(float(np.max(np.abs(position))), 1e-3)
     acceleration, share = np.gradient(rate, flight.dt), min(flight.dt / SECOND_ORDER, 1.0)
     course = {"1": np.ones(len(position)), "position": position, "acceleration": acceleration,
               "inertia": lfilter([share], [1.0, share - 1.0], acceleration),
               "position*position*position": position**3 / reach**2, "direction": np.tanh(rate / 0.02)}  # fmt: skip
-    return PATH_SIZE[name] * course[name] if name in course else PATH_SIZE["1"] * _course(flight, name)
+    return [PATH_SIZE[name] * course[name] if name in course else PATH_SIZE["1"] * _course(flight, name)
+            for name in names]
 
 
 def in_common(flights: Sequence[Reconstruction]) -> list[Reconstruction]:
