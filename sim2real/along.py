@@ -61,7 +61,8 @@ def columns(kind: np.dtype, names: tuple[str, ...]) -> np.ndarray:
 
 
 X = columns(STATE, STATES)
-MOVED = len(STATES)  # then roll and pitch, corrected through the quaternion
+MOVED = len(STATES)
+CHANGED = MOVED + 2  # roll and pitch too, corrected through the quaternion
 _E0, _E1, _E2, _E3 = (int(c) for c in columns(STATE, ("e0", "e1", "e2", "e3")))
 _Y = columns(MEASUREMENT, MEASURED[:11])
 _FELT = np.array([MEASURED.index(c) for c in ("ax", "ay", "az")])
@@ -132,20 +133,44 @@ def sense(s: Any, m: Any, c: Any, p: Any, felt: tuple, dt: float) -> None:
 
 
 @kernel
-def correct(x: Any, phi: float, left: Any, measured: Any, stretch: Any, gain: Any, fed: Any, change: Any) -> None:
-    """Turn one row's prediction `left` into measured less predicted, and move its states by the gain times that."""
+def miss(left: Any, measured: Any, stretch: Any, fed: Any, j: int) -> None:
+    """Turn one row's prediction `left` into measured less predicted, and put what corrects it into lane `j`."""
     for c in range(len(left)):
         left[c] = measured[c] - left[c]
-    for c in range(len(fed)):
-        fed[c] = left[c]*stretch[c] if np.isfinite(measured[c]) else 0.0
-    change[:] = 0.0
-    for c in range(len(fed)):
-        share = fed[c]
-        for s in range(len(change)):
-            change[s] += gain[c, s]*share
+    for c in range(FED_BACK):
+        fed[c*LANES + j] = left[c]*stretch[c] if np.isfinite(measured[c]) else 0.0
+
+
+@kernel
+def gained(gain: Any, fed: Any, change: Any) -> None:
+    """Changes of a whole block's states by one gain [FED_BACK, CHANGED]; the same sums as `gained_by_one`."""
+    for s in range(CHANGED):
+        for j in range(LANES):
+            total = 0.0
+            for c in range(FED_BACK):
+                total += gain[c, s]*fed[c*LANES + j]
+            change[s*LANES + j] = total
+
+
+@kernel
+def gained_by_one(gain: Any, fed: Any, change: Any, j: int, scratch: Any) -> None:
+    """Changes of the states of lane `j` by its own gain."""
+    for s in range(CHANGED):
+        scratch[s] = 0.0
+    for c in range(FED_BACK):
+        share = fed[c*LANES + j]
+        for s in range(CHANGED):
+            scratch[s] += gain[c, s]*share
+    for s in range(CHANGED):
+        change[s*LANES + j] = scratch[s]
+
+
+@kernel
+def correct(x: Any, phi: float, change: Any, j: int) -> None:
+    """Move one row's states by what stands in lane `j`."""
     for s in range(MOVED):
-        x[X[s]] += change[s]
-    turn(x, phi, change[MOVED], change[MOVED + 1])
+        x[X[s]] += change[s*LANES + j]
+    turn(x, phi, change[MOVED*LANES + j], change[(MOVED + 1)*LANES + j])
 
 
 @kernel
@@ -198,7 +223,7 @@ def along(table: Any, controls: Any, first: Any, last: Any, measured: Any, stret
     held = matrix(table, 2, _N_CURRENT, NUMBER)
     clock = rows(table, 6, CLOCK)[0]
     block, speeds = np.zeros(ROWS*LANES), np.zeros(len(x))
-    fed, change = np.zeros(FED_BACK), np.zeros(MOVED + 2)
+    fed, change, scratch = np.zeros(FED_BACK*LANES), np.zeros(CHANGED*LANES), np.zeros(CHANGED)
     for i in range(len(x)):
         speeds[i] = outcomes[i].airspeed
     for at in range(0, len(x), LANES):
@@ -230,10 +255,23 @@ def along(table: Any, controls: Any, first: Any, last: Any, measured: Any, stret
                 i = error_at[j, 0]
                 if at <= i < at + count:
                     out[k, i, error_at[j, 1]] += error[j, min(first[i] + k, last[i] - 1) + 1]
-            for i in range(at, at + count if len(gain) > 0 else at):
-                now = min(first[i] + k, last[i] - 1)
-                own = gain[i if len(gain) > 1 else 0, min(now, gain.shape[1] - 1)]
-                correct(x[i], y[i, _PHI], out[k, i], measured[now + 1], stretch[i], own, fed, change)
+            if len(gain) > 0:
+                here, alike = min(first[at] + k, last[at] - 1), len(gain) == 1 and count == LANES
+                for j in range(count):
+                    i = at + j
+                    now = min(first[i] + k, last[i] - 1)
+                    miss(out[k, i], measured[now + 1], stretch[i], fed, j)
+                    alike = alike and now == here
+                if alike:
+                    gained(gain[0, min(here, gain.shape[1] - 1)], fed, change)
+                else:
+                    for j in range(count):
+                        i = at + j
+                        now = min(first[i] + k, last[i] - 1)
+                        gained_by_one(gain[i if len(gain) > 1 else 0, min(now, gain.shape[1] - 1)], fed, change, j,
+                                      scratch)
+                for j in range(count):
+                    correct(x[at + j], y[at + j, _PHI], change, j)
             for j in range(len(force)):
                 i = force_at[j, 0]
                 if at <= i < at + count:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -76,22 +77,49 @@ def with_prior(gram: FloatArray, bank: Bank, precision: FloatArray, centre: Floa
     return out
 
 
-def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision: FloatArray | None = None,
-              noise: float = np.inf, courses: Sequence[UnknownFit] = ()) -> Posterior:
-    """Posterior over no gap, sets of effects, and the unknown alone or beside them.
+class Linear:
+    """What inner products say of known effects, their sizes and forms; all that is asked for again is kept.
 
-    Args:
+    Attributes:
         gram: inner products of all records.
         bank: what was flown.
         untestable: effects left out.
-        precision: prior precision of the nuisances; identity if omitted.
+        reduced: inner products, nuisances integrated out.
+    """
+
+    def __init__(self, gram: FloatArray, bank: Bank, untestable: Sequence[str], precision: FloatArray | None = None
+                 ) -> None:  # fmt: skip
+        """Args: precision: prior precision of the nuisances; identity if omitted."""
+        self.gram, self.bank, self.untestable = gram, bank, tuple(untestable)
+        self.reduced = reduce(gram, bank, precision)
+
+    @cached_property
+    def known(self) -> tuple[dict[str, EffectFit], list[Hypothesis]]:
+        """Every effect by itself; and no gap, single effects, pairs and triples as the library has them."""
+        return _known(self.reduced, self.bank, self.untestable)
+
+    @cached_property
+    def formed(self) -> list[Hypothesis]:
+        """The same hypotheses with their other forms."""
+        return [replace(h, form=_form(self.reduced, self.gram, self.bank, h.fit)) if h.effects else h
+                for h in self.known[1]]
+
+    @cached_property
+    def unknown(self) -> list[UnknownFit]:
+        """Generic terms alone, by component."""
+        return list(fit_unknown(self.reduced, self.bank))
+
+
+def attribute(linear: Linear, noise: float = np.inf, courses: Sequence[UnknownFit] = ()) -> Posterior:
+    """Posterior over no gap, sets of effects, and the unknown alone or beside them.
+
+    Args:
+        linear: what the inner products say.
         noise: whitened square that noise alone would leave, if known to be less than the best explanation leaves.
         courses: `course_fits` of what the model leaves.
     """
-    reduced = reduce(gram, bank, precision)
-    fits, found = _known(reduced, bank, untestable)
-    found = [replace(h, form=_form(reduced, gram, bank, h.fit)) if h.effects else h for h in found]
-    found, unknown_fits = homes(found, with_courses(fit_unknown(reduced, bank), courses), float(reduced[0, 0]), gram)
+    reduced, gram, bank, (fits, _) = linear.reduced, linear.gram, linear.bank, linear.known
+    found, unknown_fits = homes(linear.formed, with_courses(linear.unknown, courses), float(reduced[0, 0]), gram)
     least = min([h.left for h in found] + [u.left for u in unknown_fits] + [noise])
     found = forgive(found, float(reduced[0, 0]), least)
     for known in _leading(found):
@@ -103,17 +131,16 @@ def attribute(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision
                      raw=gram, courses=tuple(courses))
 
 
-def least_misfit(gram: FloatArray, bank: Bank, untestable: Sequence[str], precision: FloatArray) -> float:
+def least_misfit(linear: Linear) -> float:
     """Whitened square that the best of all explanations leaves over, none of them in another form."""
-    reduced = reduce(gram, bank, precision)
-    found, alone = _known(reduced, bank, untestable)[1], fit_unknown(reduced, bank)
-    beside_known = [h for known in _leading(found) for h in _with_unknown(reduced, gram, bank, known, alone)[1]]
+    found, alone = linear.known[1], linear.unknown
+    beside_known = [h for known in _leading(found)
+                    for h in _with_unknown(linear.reduced, linear.gram, linear.bank, known, alone)[1]]
     return min([h.fit.misfit for h in found] + [u.misfit for u in alone]
                + [h.unknown.misfit for h in beside_known if h.unknown])  # fmt: skip
 
 
 def _known(reduced: FloatArray, bank: Bank, untestable: Sequence[str]) -> tuple[dict[str, EffectFit], list[Hypothesis]]:
-    """Every effect by itself; and no gap, single effects, pairs and triples as the library has them."""
     by_family = {f: fit_family(reduced, f) for f in bank.families if f.effect.name not in untestable}
     names = list(dict.fromkeys(f.effect.name for f in by_family))
     alternatives = {n: [e for f, e in by_family.items() if f.effect.name == n] for n in names}
@@ -123,7 +150,7 @@ def _known(reduced: FloatArray, bank: Bank, untestable: Sequence[str]) -> tuple[
     for name, own in alternatives.items():
         parameters = len({e.family.parameter.name for e in own})  # of equal prior; pieces of a range share one
         log = float(np.logaddexp.reduce([e.log_evidence for e in own]) - np.log(parameters))
-        found.append(Hypothesis(_alone(fits[name]), None, single, log))
+        found.append(Hypothesis(of_one(fits[name]), None, single, log))
     return fits, found + _several(reduced, bank, [i for i, f in enumerate(bank.families) if f in by_family])
 
 
@@ -149,7 +176,8 @@ def _inclusion(found: Sequence[Hypothesis]) -> dict[str, float]:
     return out
 
 
-def _alone(fit: EffectFit) -> SetFit:
+def of_one(fit: EffectFit) -> SetFit:
+    """An effect by itself as a set."""
     spread = ((fit.high95 - fit.low95) / 3.92) ** 2
     return SetFit((fit.family,), fit.log_evidence, (fit.estimate,), (fit.low95,), (fit.high95,), np.array([[spread]]),
                   fit.weights, fit.misfit)

@@ -30,6 +30,7 @@ FILTER_SPREAD = 0.1  # of the recording's cut-off: channels are in step to a few
 VANE_SPREAD, PITOT_SPREAD, BOOM_SPREAD = 0.008, 0.05, 1e-4
 VANE_SCALE = 0.015  # of a flow vane's reading, upwash included (assumed)
 LEAST = 0.1  # of a published value: a filter or a thrust with another sign does not fly
+NODES, FEW = 4, 2  # sizes of a parameter; and where it only has to be seen whether it is worth more
 NUISANCE_STEP = 0.1  # standard deviations at which the derivative with respect to a nuisance is taken
 
 
@@ -104,16 +105,15 @@ def nuisances() -> tuple[Nuisance, ...]:
 
 
 def nodes(parameter: Parameter) -> tuple[float, ...]:
-    """Sizes at which an effect is flown: its typical size, multiples of it, and the ends of its range."""
+    """Up to NODES sizes at which an effect is flown: its typical size, both signs, the ends of its range, multiples."""
     reach = parameter.typical or 0.5 * max(parameter.high, -parameter.low) * 0.5
-    wanted = [parameter.low, parameter.high, reach, -reach, 2.5 * reach, -2.5 * reach]
     found: list[float] = []
     span = parameter.high - parameter.low
-    for value in sorted(wanted, key=lambda v: abs(abs(v) - abs(reach))):
+    for value in (reach, -reach, parameter.low, parameter.high, 2.5 * reach, -2.5 * reach):
         inside = parameter.low - 1e-12 <= value <= parameter.high + 1e-12
         if inside and abs(value - parameter.neutral) > 0.02 * span and all(abs(value - v) > 0.06 * span for v in found):
             found.append(value)
-    return tuple(sorted(found))
+    return tuple(sorted(found[:NODES]))
 
 
 # Sizes of effects whose signatures bend so much that one polynomial does not follow them: piece by piece.
@@ -140,6 +140,17 @@ def unbroken(families: Iterable[Family]) -> list[Family]:
     whole = {(f.effect.name, f.parameter.name): f for f in families}
     return [replace(f, nodes=nodes(f.parameter), rows=(), low=f.parameter.low, high=f.parameter.high)
             for f in whole.values()]
+
+
+def at_few_sizes(candidates: Bank, untestable: Iterable[str] = ()) -> Bank:
+    """Every parameter at the FEW sizes nearest to its typical one, and no generic terms: to see what is worth more."""
+    gone, families, row = set(untestable), [], 1 + len(candidates.nuisances)
+    for family in unbroken(f for f in candidates.families if f.effect.name not in gone):
+        reach = abs(family.parameter.typical) or 0.25 * max(family.high, -family.low)
+        own = tuple(sorted(sorted(family.nodes, key=lambda size: abs(abs(size) - reach))[:FEW]))
+        families.append(replace(family, nodes=own, rows=tuple(range(row, row + len(own)))))
+        row += len(own)
+    return replace(candidates, families=tuple(families), terms=(), size=row)
 
 
 def bank(without: Iterable[str] = ()) -> Bank:

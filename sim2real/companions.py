@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from sim2real.bends import changes
+from sim2real.candidates import Bank
 from sim2real.form import home
 from sim2real.hypotheses import Hypothesis, Posterior
 from sim2real.points import Flying
 from sim2real.sets import SetFit
 from sim2real.singles import EffectFit, fit_family
+from sim2real.sizes import flown_weights
 from sim2real.steps import Point
 
 LEADING, LIKELY = 2, 0.02  # explanations that are flown again, and how probable they have to be
@@ -38,7 +42,7 @@ def companions(flying: Flying, linear: Posterior, first: SetFit, point: Point) -
     moving = suspects(flying, linear, point)
     for reduced in flying.beside(first, point, home(first.effects)):
         best: dict[str, EffectFit] = {}
-        for family in flying.candidates.families:
+        for family in flying.few.families:
             name = family.effect.name
             if name in linear.fits and name not in first.effects:
                 fit = fit_family(reduced, family)
@@ -49,7 +53,14 @@ def companions(flying: Flying, linear: Posterior, first: SetFit, point: Point) -
         promising = sorted(best.values(), key=lambda fit: -fit.log_evidence)[:COMPANIONS]
         out |= {fit.family.effect.name: fit for fit in promising if fit.log_evidence > LEAST_ADDED}
         out |= {name: best[name] for name in moving if name in best}
-    return list(out.values())
+    return [_in_bank(fit, flying.candidates) for fit in out.values()]
+
+
+def _in_bank(fit: EffectFit, candidates: Bank) -> EffectFit:
+    """An effect fitted at a few sizes, with the rows of the whole bank: of the piece of its range where it lies."""
+    own = next(f for f in candidates.families if f.effect is fit.family.effect
+               and f.parameter is fit.family.parameter and f.low <= fit.estimate <= f.high)
+    return replace(fit, family=own, weights=flown_weights(own, fit.estimate))
 
 
 def suspects(flying: Flying, linear: Posterior, point: Point) -> list[str]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icing_env.record import FloatArray
-from sim2real.candidates import NUISANCE_STEP, Bank, parameter_rows
+from sim2real.candidates import NUISANCE_STEP, Bank, Family, parameter_rows
 from sim2real.evidence import Evidence, compare
 from sim2real.references import Baseline
 from sim2real.settling import nearer
@@ -24,6 +24,7 @@ from sim2real.singles import DETECTABLE, EffectFit
 ROUNDS = 5  # times that all are flown
 MOST = 3.0  # times by which a size is changed at once
 EDGE = 1e-6  # of a range
+SETTLED = 0.02  # of a size, by which the last flight changes it
 
 
 def limits(evidences: Sequence[Evidence], candidates: Bank, baseline: Baseline, tempering: float,
@@ -42,39 +43,59 @@ def limits(evidences: Sequence[Evidence], candidates: Bank, baseline: Baseline, 
     reach -= neutral
     share = np.array([fits[name].smallest for name in names], float)
     share, n = (share - neutral) / reach, len(candidates.nuisances)
-    moved, low, high = np.zeros((1 + n + len(names), n)), np.zeros(len(names)), np.full(len(names), np.inf)
+    inner = np.sum([e.gram[1 : 1 + n, 1 : 1 + n] for e in evidences], axis=0) / NUISANCE_STEP**2 / tempering
+    moved, low, high = np.zeros((len(names), n)), np.zeros(len(names)), np.full(len(names), np.inf)
+    never, left = np.zeros(len(names), bool), np.arange(len(names))
     for turn in range(ROUNDS):
-        own = tuple(replace(f, nodes=(size,), rows=(1 + n + i,))
-                    for i, (f, size) in enumerate(zip(families, neutral + share * reach, strict=True)))
-        flown = replace(candidates, families=own, terms=(), size=len(moved))
-        grams = each(lambda e, bank=flown, at=moved: compare(e.flight, moved_rows(e, bank, at), e.gain, e.factor).gram,
-                     evidences)
-        best, left = hiding(per_deviation(np.sum(grams, axis=0), n) / tempering, baseline.precision, moved)
-        distance = np.sqrt(np.maximum(np.diag(left)[1 + n :], 1e-12))
+        own = tuple(replace(families[i], nodes=(neutral[i] + share[i] * reach[i],), rows=(1 + k,))
+                    for k, i in enumerate(left))
+        gram, cross = _signatures(evidences, candidates, own, moved[left])
+        best, beyond = hiding(inner, cross / tempering, gram / tempering, baseline.precision, moved[left])
+        distance = np.sqrt(np.maximum(np.diag(beyond), 1e-12))
         hidden = distance < DETECTABLE
-        low = np.where(hidden, share, low)
+        low[left] = np.where(hidden, share[left], low[left])
         if turn > 0:  # at first nuisances do not hide as much as they can
-            high = np.where(hidden, high, share)
-        wanted = share * np.clip(DETECTABLE / distance, 1.0 / MOST, MOST)
+            high[left] = np.where(hidden, high[left], share[left])
+        wanted, lower, upper = share[left] * np.clip(DETECTABLE / distance, 1.0 / MOST, MOST), low[left], high[left]
         # a stall that is not reached shows nothing, and then too much: half the way between
-        between = ((wanted <= low) | (wanted >= high)) & (low > 0.0) & np.isfinite(high)
-        wanted = np.where(between, np.sqrt(low * np.where(between, high, 1.0)), wanted)
+        between = ((wanted <= lower) | (wanted >= upper)) & (lower > 0.0) & np.isfinite(upper)
+        wanted = np.where(between, np.sqrt(lower * np.where(between, upper, 1.0)), wanted)
         grown = np.minimum(wanted, 1.0)
-        moved = nearer(best, candidates)
-        moved[: 1 + n] = 0.0  # the model and the nuisances themselves
-        moved[1 + n :] *= (grown / share)[:, None]
-        never, share = hidden & (share > 1.0 - EDGE), grown
+        ratio = grown / share[left]
+        moved[left] = nearer(best, candidates) * ratio[:, None]
+        never[left], share[left] = hidden & (share[left] > 1.0 - EDGE), grown
+        left = left[(np.abs(ratio - 1.0) > SETTLED) | (turn == 0)]
+        if not len(left):
+            break
     return {name: None if out else float(size)
             for name, out, size in zip(names, never, neutral + share * reach, strict=True)}
 
 
-def moved_rows(evidence: Evidence, candidates: Bank, moved: FloatArray) -> NDArray:
-    """PARAMETERS of every row for one record, moved by nuisances in standard deviations [rows, nuisances]."""
-    return with_nuisances(parameter_rows(evidence.flight, candidates), candidates, moved, evidence.flight.power_from)
+def _signatures(evidences: Sequence[Evidence], candidates: Bank, families: tuple[Family, ...], moved: FloatArray
+                ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Inner products of some effects' signatures [m, m], and theirs with a deviation of each nuisance [m, n].
+
+    What a deviation makes of the records is known from where the variants were flown.
+
+    Args:
+        families: flown at their one node, rows 1 to m.
+        moved: nuisances of each [m, n].
+    """
+    n, rows = moved.shape[1], range(1, 1 + len(families))
+    alone = replace(candidates, nuisances=(), families=families, terms=(), size=1 + len(families))
+
+    def of_record(e: Evidence) -> tuple[FloatArray, FloatArray]:
+        own = with_nuisances(parameter_rows(e.flight, alone), candidates, np.vstack([np.zeros(n), moved]),
+                             e.flight.power_from)
+        found = compare(e.flight, own, e.gain, e.factor, keep=rows)
+        return found.gram[1:, 1:], found.rows.T @ e.rows[:, :n] / NUISANCE_STEP
+
+    grams, across = zip(*each(of_record, evidences), strict=True)
+    return np.sum(grams, axis=0), np.sum(across, axis=0)
 
 
 def with_nuisances(rows: NDArray, candidates: Bank, moved: FloatArray, power_from: str) -> NDArray:
-    """The same of rows that are given, changed in place."""
+    """PARAMETERS of rows moved by nuisances in standard deviations [rows, nuisances], changed in place."""
     for nuisance, sizes in zip(candidates.nuisances, moved.T, strict=True):
         if sizes.any():
             nuisance.apply(rows, slice(None), power_from, sizes)
@@ -88,15 +109,15 @@ def per_deviation(gram: FloatArray, n: int) -> FloatArray:
     return np.asarray(gram * unit[:, None] * unit)
 
 
-def hiding(gram: FloatArray, precision: FloatArray, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
+def hiding(inner: FloatArray, cross: FloatArray, gram: FloatArray, precision: FloatArray, moved: FloatArray
+           ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Nuisances that hide each signature best [rows, n], and the inner products of what these leave [rows, rows].
 
     Args:
-        gram: of signatures, flown with nuisances `moved` [rows, n]; after the first those of the nuisances themselves.
+        inner: inner products of what a deviation of each nuisance makes [n, n].
+        cross, gram: of signatures, flown with nuisances `moved` [rows, n], with these and with one another.
         precision: of the nuisances' prior [n, n].
     """
-    first = slice(1, 1 + len(precision))
-    inner, cross = gram[first, first], gram[:, first]
     best: FloatArray = np.asarray(np.linalg.solve(inner + precision, (moved @ inner - cross).T).T, np.float64)
     step = best - moved
     along = cross @ step.T

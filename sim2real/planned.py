@@ -156,7 +156,7 @@ def evidence(flights: Sequence[Reconstruction], candidates: Bank, sigma: float, 
         progress(f"flying {candidates.size} variants through {len(flights)} manoeuvres, {1 + k} of {1 + SETTLING}")
         gram = np.sum([_signatures(flight, candidates, sigma, moved) for flight in flights], axis=0)
         found.append(gram)
-        best, left = hiding(gram, np.eye(n), moved)
+        best, left = hiding(gram[1 : 1 + n, 1 : 1 + n], gram[:, 1 : 1 + n], gram, np.eye(n), moved)
         moved = nearer(best, candidates)
         moved[: 1 + n] = 0.0  # the model and the nuisances themselves
     return found[0], left

@@ -15,7 +15,7 @@ from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.abreast import Abreast, end_to_end
 from sim2real.attribution import reduce, with_prior
-from sim2real.candidates import NUISANCE_STEP, Bank, parameter_rows
+from sim2real.candidates import NUISANCE_STEP, Bank, at_few_sizes, parameter_rows
 from sim2real.courses import Course, Courses, Remainder, in_time
 from sim2real.evidence import SETTLE, Evidence, compare, to_fly, told
 from sim2real.paths import PATHS, excess, of_paths, path_gram
@@ -45,7 +45,7 @@ from sim2real.valleys import lowest
 SIDE_BY_SIDE = 6  # steps with the same slopes where many sets take them together
 HOPELESS = 100.0  # log likelihood from the best, and half of what that explains, beyond which nothing is tried further
 TURNS = 3  # how often slopes by nuisances are flown anew
-NEAR = 5.0  # such a gain, of a point so near that its slopes will do
+NEAR = 5.0  # such a gain, promised or made, of a point so near that its slopes will do
 ROUGH = 1e-3  # share of half the square above noise, that a turn has to take of it
 FAR = 1000.0  # whitened square above the linear fit's that makes another start worth a flight
 
@@ -79,7 +79,7 @@ class Flying:
             best = self.point(fit, best.sizes, best.nuisances)
             before, gain = best.cost, promised(best, step_from(fit, best))
             best = self._descended(fit, best)
-            if gain < NEAR or before - best.cost < self.worth(best):
+            if gain < NEAR or before - best.cost < max(NEAR, self.worth(best)):
                 break
         return best
 
@@ -111,6 +111,11 @@ class Flying:
                                          [pushes for _, pushes in chosen])
         return each(lambda flight, left, which, own, e: told(flight, left, which[0], len(own), e.gain, e.factor, keep),
                     self.flights, made, chosen, rows, self.evidences)
+
+    @cached_property
+    def few(self) -> Bank:
+        """The library at a few sizes."""
+        return at_few_sizes(self.candidates)
 
     @cached_property
     def near(self) -> list[Slopes]:
@@ -260,11 +265,11 @@ class Flying:
         return Remainder(gram, first, kept, left_in, (*ends(fit, point), *(int(j) for j in 1 + k + point.held)))
 
     def beside(self, fit: SetFit, point: Point, home: Collection[str]) -> list[FloatArray]:
-        """Inner products of every effect of the library (rows of the bank) about a set where it was flown.
+        """Inner products of every effect of the library (rows of `few`) about a set where it was flown.
 
         Then the same without what free courses of time at `home`, or a path there, would explain.
         """
-        only, names = replace(self.candidates, terms=()), in_time(home)
+        only, names = self.few, in_time(home)
 
         def of_record(flight: Reconstruction, evidence: Evidence, course: Course) -> tuple[FloatArray, FloatArray]:
             at = _rows(flight, self.candidates, fit, point.sizes, np.zeros(len(point.sizes)), point.nuisances)[:1]
@@ -276,8 +281,8 @@ class Flying:
 
         total, taken = np.sum(each(of_record, self.flights, self.evidences, self.courses.along), axis=0)
         prior, nothing = self.baseline.precision, np.zeros_like(self.baseline.precision)
-        return [reduce(holding(1 + point.held, with_prior(gram, self.candidates, prior, point.nuisances)),
-                       self.candidates, nothing) for gram in (total, total - taken)]
+        return [reduce(holding(1 + point.held, with_prior(gram, only, prior, point.nuisances)),
+                       only, nothing) for gram in (total, total - taken)]
 
 
 def _rows(flight: Reconstruction, candidates: Bank, fit: SetFit, sizes: FloatArray, steps: FloatArray,

@@ -55,7 +55,7 @@ from sim2real.hypotheses import (
 from sim2real.other_form import Bent, flown_squares, flown_unknown, other_form
 from sim2real.points import Flying
 from sim2real.sets import SetFit
-from sim2real.steps import Point
+from sim2real.steps import Place, Point
 from sim2real.tempering import noise
 from sim2real.terms import in_what_is_left
 
@@ -65,13 +65,15 @@ TAKEN = 4.0  # whitened square above luck, that generic terms take of what leave
 FEW_PLACES = 5  # components at which courses of time are freed together
 
 
-def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior: Posterior) -> Posterior:
+def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior: Posterior,
+           places: Places) -> Posterior:  # fmt: skip
     """The posterior with its leading explanations fitted where they lie, until the best of them has been flown.
 
     Args:
         start: nuisances [n] that a hypothesis is settled from.
+        places: where sets of several settled before, by effects and parameters: those are settled from there; added to.
     """
-    search = _Search(flying, start, posterior)
+    search = _Search(flying, start, posterior, places)
     search.fly([search.nothing_at_all(), *(search.found.index(h) for h in leading(posterior))])
     search.fly(search.companions())
     while len(search.points) < MOST and (following := search.following()) is not None:
@@ -79,10 +81,14 @@ def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior:
     return search.posterior()
 
 
+Places = dict[tuple[tuple[str, str], ...], Place]  # by effects and their parameters
+
+
 class _Search:
     """Hypotheses, as they are known so far, and those of them that have been flown."""
-    def __init__(self, flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior: Posterior) -> None:
-        self.flying, self.start, self.linear = flying, start, posterior
+    def __init__(self, flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior: Posterior,
+                 places: Places) -> None:  # fmt: skip
+        self.flying, self.start, self.linear, self.places = flying, start, posterior, places
         self.found = list(posterior.hypotheses)
         self.before = list(self.found)  # as the linear fit has them
         self.points: dict[int, Point] = {}
@@ -130,7 +136,7 @@ class _Search:
 
     def _fly(self, i: int) -> None:
         h = self.found[i]
-        self.points[i] = self.flying.settle(h.fit, self.beginning[i] if i in self.beginning else self.start(h))
+        self.points[i] = self._settled(i, h)
         self.found[i] = h = corrected(h, self.points[i], self.linear)
         if lost(self.points[i], self.linear):
             return
@@ -143,6 +149,18 @@ class _Search:
             self.found[i] = replace(h, form=self._form(i, h, left), instead=None)
         else:
             self.nothing = h.fit.misfit
+
+    def _settled(self, i: int, h: Hypothesis) -> Point:
+        fit, own = h.fit, tuple((f.effect.name, f.parameter.name) for f in h.fit.families)
+        if own in self.places:
+            sizes, nuisances = self.places[own]
+            fit = replace(fit, estimate=tuple(sizes))
+        else:
+            nuisances = self.beginning[i] if i in self.beginning else self.start(h)
+        point = self.flying.settle(fit, nuisances)
+        if len(own) > 1:
+            self.places[own] = point.sizes, point.nuisances
+        return point
 
     def _form(self, i: int, h: Hypothesis, left: FloatArray) -> Form:
         """Another form of a flown set, itself flown where it takes much."""

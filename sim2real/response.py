@@ -13,13 +13,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from icing_env.jit import entry
 from icing_env.record import FloatArray
 from sim2real.along import STATES
 from sim2real.channels import MEASURED
 from sim2real.kalman import Gain, linearise
-from sim2real.predictor import TANGENT, Push, seen
+from sim2real.predictor import Push, seen
 from sim2real.reconstruct import Reconstruction
 
 SPAN = 0.25  # s between linearisations: another tenth of that changes responses in turbulence by 0.1 %
@@ -57,8 +58,11 @@ class Filter:
         felt = [(rows.index(q.row), MEASURED.index("a" + "xyz"["uvw".index(q.target)]), q.series) for q in pushes
                 if not q.sensor and q.target in "uvw"]  # fmt: skip
         errors = felt + [(rows.index(q.row), MEASURED.index(q.target), q.series) for q in pushes if q.sensor]
+        order, onset = _in_turn(pushes, rows)
+        place = np.argsort(order)
+        forces, errors = ([(int(place[row]), at, series) for row, at, series in items] for items in (forces, errors))
         _respond(*self._along, self.gain.K, seen(flight), *_by_sample(forces, flight), *_by_sample(errors, flight),
-                 self.factor, np.zeros((len(TANGENT), len(rows))), out, self.first)
+                 self.factor, order, onset, out, self.first)
         return Responses(tuple(rows), out)
 
     @cached_property
@@ -72,6 +76,17 @@ class Filter:
         return A, C, each
 
 
+def _in_turn(pushes: Sequence[Push], rows: Sequence[int]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Indices of rows in the order in which they are first pushed, and the samples at which they are."""
+    onset = {row: len(pushes[0].series) for row in rows}
+    for push in pushes:
+        if push.series.any():
+            onset[push.row] = min(onset[push.row], int(np.argmax(push.series != 0.0)))
+    first = np.array([onset[row] for row in rows], np.intp)
+    order = np.argsort(first, kind="stable")
+    return order, first[order]
+
+
 def _by_sample(items: list[tuple[int, int, FloatArray]], flight: Reconstruction) -> tuple[Any, FloatArray]:
     """(row, state or channel) of each [items, 2], and their series [N, items]."""
     at = np.array([item[:2] for item in items], np.intp).reshape(-1, 2)
@@ -80,23 +95,35 @@ def _by_sample(items: list[tuple[int, int, FloatArray]], flight: Reconstruction)
 
 @entry
 def _respond(A: Any, C: Any, each: int, gain: Any, weight: Any, force_at: Any, force: Any, error_at: Any, error: Any,
-             factor: Any, x: Any, out: Any, first: int) -> None:
-    """Step the departures of all rows together.
+             factor: Any, order: Any, onset: Any, out: Any, first: int) -> None:
+    """Step the departures of all rows together, each from where it is first pushed.
 
     Args:
         A, C: of the one-step map in the middle of every span of `each` steps [spans, states or channels, states].
         gain: [steps, states, FED_BACK], the last step's goes on.
         weight: of every reading in the correction, zero where nothing was measured [N, channels].
-        force_at, force: (row, state) of what is added to states [F, 2], and how much at each sample [N, F].
+        force_at, force: (row, state) of what is added to states [F, 2], and how much at each sample [N, F]; rows as
+            they stand in `order`.
         error_at, error: (row, channel) of what is added to readings [E, 2], and how much at each sample [N, E].
         factor: [N-1, channels, channels].
-        x: departures of the states, at the start and then at the end [states, rows].
-        out: [(N-1-first) x channels, rows].
+        order: where each row stands in `out` [rows].
+        onset: sample before which nothing pushes it, ascending [rows].
+        out: [(N-1-first) x channels, rows], zeros.
     """
     n, m, fed = A.shape[1], C.shape[1], gain.shape[2]
-    both, after = np.empty((n + m, n)), np.empty((n + m, x.shape[1]))
-    fall, read = np.empty((n, fed)), np.empty((m, m))
+    both, fall, read = np.empty((n + m, n)), np.empty((n, fed)), np.empty((m, m))
+    x = np.zeros((n, 0))
+    after, white = np.zeros((n + m, 0)), np.zeros((m, 0))
     for k in range(len(factor)):
+        rows = x.shape[1]
+        while rows < len(onset) and onset[rows] <= k + 1:
+            rows += 1
+        if rows > x.shape[1]:
+            grown = np.zeros((n, rows))
+            grown[:, : x.shape[1]] = x
+            x, after, white = grown, np.zeros((n + m, rows)), np.zeros((m, rows))
+        if rows == 0:
+            continue
         at = (k + 0.5)/each - 0.5
         i = min(max(int(np.floor(at)), 0), len(A) - 1)
         j, share = min(i + 1, len(A) - 1), min(max(at - i, 0.0), 1.0)
@@ -110,14 +137,20 @@ def _respond(A: Any, C: Any, each: int, gain: Any, weight: Any, force_at: Any, f
         x[:] = after[:n]
         for e in range(len(error_at)):
             row, channel, size = error_at[e, 0], error_at[e, 1], error[k + 1, e]
-            after[n + channel, row] += size
-            if channel < fed:
-                for s in range(n):
-                    x[s, row] -= fall[s, channel]*size
+            if row < rows and size != 0.0:
+                after[n + channel, row] += size
+                if channel < fed:
+                    for s in range(n):
+                        x[s, row] -= fall[s, channel]*size
         for f in range(len(force_at)):
-            x[force_at[f, 1], force_at[f, 0]] += force[k + 1, f]
+            if force_at[f, 0] < rows:
+                x[force_at[f, 1], force_at[f, 0]] += force[k + 1, f]
         if k >= first:
             for c in range(m):
                 for d in range(m):
                     read[c, d] = -factor[k, c, d] if weight[k + 1, d] > 0.0 else 0.0
-            np.dot(read, after[n:], out[(k - first)*m : (k - first + 1)*m])
+            np.dot(read, after[n:], white)
+            for c in range(m):
+                to = out[(k - first)*m + c]
+                for r in range(rows):
+                    to[order[r]] = white[c, r]

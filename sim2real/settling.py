@@ -25,7 +25,7 @@ from sim2real.terms import pushes
 
 SETTLING, SETTLED = 6, 10.0  # steps towards the best nuisances, and the whitened length of a step that ends them
 NEAR = 2  # of SIGMAS to either side are tried
-TURNS = 4  # times at most that gusts are judged with an explanation, and that is brought to its best in them
+TURNS = 4
 UNLIKE = 0.06  # log of the ratio of innovation variances beyond which another gain is worth a flight (assumed)
 DEPARTED = 1e6  # mean whitened square of a model that does not follow the record: an effect far off makes 1e4
 MOVED = 4.0  # standard deviations by which the model that variants are flown about is moved at most
@@ -103,7 +103,7 @@ def gather_about(flights: Sequence[Reconstruction], candidates: Bank, centre: Fl
     return each(lambda flight, gain: gather(flight, candidates, gain), moved, known or [None] * len(moved))
 
 
-def gains_with(flying: Flying, best: Hypothesis, nuisances: FloatArray) -> list[Gain]:
+def gains_with(flying: Flying, best: Hypothesis, nuisances: FloatArray, turns: int = TURNS) -> list[Gain]:
     """Gains of the best explanation, it and the gusts found together, from where it was flown in other gusts.
 
     Without it, what a gap makes of a record passes for gust, or for calm; and the innovations of an aircraft whose
@@ -111,13 +111,14 @@ def gains_with(flying: Flying, best: Hypothesis, nuisances: FloatArray) -> list[
 
     Args:
         nuisances: [n] of the best explanation, where it was flown.
+        turns: times at most that gusts are judged with it, and that it is brought to its best in them.
     """
     candidates = flying.candidates
-    for turn in range(TURNS):
+    for turn in range(turns):
         moved = [_with(f, candidates, best, nuisances) for f in flying.flights]
         pushed = [_pushed(e, f, candidates, best.pushed) for e, f in zip(flying.evidences, moved, strict=True)]
         known = each(likeliest, moved, [e.gain for e in flying.evidences], pushed)
-        if best.pushed or not best.effects or not differ(known, flying.evidences) or turn == TURNS - 1:
+        if best.pushed or not best.effects or not differ(known, flying.evidences) or turn == turns - 1:
             break
         flying = replace(flying, evidences=each(_in_gusts, flying.evidences, known, moved))
         point = flying.settled(best.fit, flying.point(best.fit, np.array(best.fit.estimate), nuisances))

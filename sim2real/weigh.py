@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from icing_env.record import FloatArray
 from sim2real.any_course import course_fits
-from sim2real.attribution import attribute, least_misfit, nuisance_mean, with_prior
-from sim2real.candidates import Bank
+from sim2real.attribution import Linear, attribute, least_misfit, nuisance_mean, of_one, reduce, with_prior
+from sim2real.candidates import Bank, at_few_sizes
 from sim2real.companions import leading
 from sim2real.courses import Course, Courses
 from sim2real.evidence import Evidence
@@ -20,15 +20,17 @@ from sim2real.kalman import Gain
 from sim2real.points import Flying
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
-from sim2real.refine import refine
+from sim2real.refine import Places, refine
 from sim2real.screen import Points, screen, screened
 from sim2real.settling import differ, followed, gains_with, gather_about, length, nearer
+from sim2real.singles import fit_family
 from sim2real.steps import FARTHEST
 from sim2real.tempering import noise, temper, total
 from sim2real.varying import varying
 
 RELINEARISE = 8.0  # whitened distance of the fitted nuisances beyond which all is flown again about them
 AGAIN = 2  # times at most
+PLAIN, GUESSES = 20.0, 4  # log evidence by which an effect is plain to see, and how many of these are flown
 CALMER = 0.6  # ratio of temperings below which the leading explanations are flown again
 Progress = Callable[[str], None]
 
@@ -47,6 +49,7 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
     progress("fitting the model's own uncertainty")
     flights, centre, known = followed(flights, candidates, baseline)
     found = _Weighing(flights, candidates, baseline, untestable, centre)
+    known = first_guess(flights, candidates, baseline, untestable, centre, known)
     progress(f"flying {candidates.size} variants along {len(flights)} records")
     found.gather(known)
     for _ in range(AGAIN):
@@ -67,6 +70,32 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
     return found.evidences, replace(posterior, hypotheses=doubted(normalised(posterior.hypotheses)))
 
 
+def first_guess(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline, untestable: Iterable[str],
+                centre: FloatArray, known: list[Gain]) -> list[Gain]:  # fmt: skip
+    """Gains with the likeliest single effect in the model, if one is plain to see; else those known.
+
+    A gap passes for gust. What all variants would have to be flown again for is seen with a few of them.
+    """
+    few = at_few_sizes(candidates, untestable)
+    evidences = gather_about(flights, few, centre, known)
+    gram = with_prior(total(evidences), few, baseline.precision, centre)
+    reduced = reduce(gram, few, np.zeros_like(baseline.precision))
+    tempering = max(temper(float(reduced[0, 0]), evidences), 1.0)
+    gram = with_prior(total(evidences) / tempering, few, baseline.precision, centre)
+    reduced = reduce(gram, few, np.zeros_like(baseline.precision))
+    fits = sorted((fit_family(reduced, f) for f in few.families), key=lambda fit: -fit.log_evidence)[:GUESSES]
+    if not fits or fits[0].log_evidence < PLAIN:
+        return known
+    flying = Flying(flights, few, evidences, baseline, tempering, Courses([Course(e) for e in evidences], tempering))
+    alone = [of_one(fit) for fit in fits if fit.log_evidence > PLAIN]
+    starts = [np.clip(centre + nuisance_mean(gram, few, fit.weights or {}), -FARTHEST, FARTHEST) for fit in alone]
+    points = flying.descended(alone, starts)
+    best = min(range(len(points)), key=lambda i: points[i].cost)
+    point = points[best]
+    fit = replace(alone[best], estimate=tuple(point.sizes))
+    return gains_with(flying, Hypothesis(fit, None, 0.0, 0.0), point.nuisances, 1)
+
+
 class _Weighing:
     """Evidence of some records about a model moved by `centre` [n] nuisances, and what it says so far.
 
@@ -84,12 +113,14 @@ class _Weighing:
         self.known: list[Gain] | None = None
         self.quiet = dict(untestable)
         self.points: Points = {}
+        self.linear: dict[float, Linear] = {}
+        self.places: Places = {}
 
     def gather(self, known: Sequence[Gain] | None, tempering: float | None = None) -> None:
         """Fly the variants about the centre, with gains (and tempering) where known, and weigh what they say."""
         self.evidences = gather_about(self.flights, self.candidates, self.centre, known)
         self.along = [Course(e) for e in self.evidences]
-        self.points = {}
+        self.points, self.linear = {}, {}
         self._weigh(tempering)
 
     def weigh_courses(self) -> None:
@@ -100,7 +131,8 @@ class _Weighing:
 
     def _weigh(self, tempering: float | None, free: Sequence[UnknownFit] = ()) -> None:
         self.quiet = dict(self.untestable)
-        linear = weigh(self.evidences, self.candidates, self.quiet, self.baseline, self.centre, tempering, free)
+        linear = weigh(self.evidences, self.candidates, self.quiet, self.baseline, self.centre, self.linear,
+                       tempering, free)
         if not self.points or linear.tempering != self.posterior.tempering:
             self.posterior = linear
             self.points = screen(self._flying(), self.start, linear)
@@ -150,7 +182,7 @@ class _Weighing:
 
     def refine(self) -> None:
         """Fly the leading explanations where they lie."""
-        self.posterior = refine(self._flying(), self.start, self.posterior)
+        self.posterior = refine(self._flying(), self.start, self.posterior, self.places)
 
     def judged_anew(self) -> bool:
         """Weigh anew with the gains and the tempering of the best explanation flown, where these are others."""
@@ -167,7 +199,8 @@ class _Weighing:
 
 
 def weigh(evidences: Sequence[Evidence], candidates: Bank, untestable: dict[str, str], baseline: Baseline,
-          centre: FloatArray, tempering: float | None = None, free: Sequence[UnknownFit] = ()) -> Posterior:
+          centre: FloatArray, kept: dict[float, Linear], tempering: float | None = None,
+          free: Sequence[UnknownFit] = ()) -> Posterior:
     """Posterior of all records together; effects whose whole range would not show are added to `untestable`.
 
     Args:
@@ -175,19 +208,19 @@ def weigh(evidences: Sequence[Evidence], candidates: Bank, untestable: dict[str,
         untestable: effects left out, with the reason; changed in place.
         baseline: the model and its precision.
         centre: nuisances [n] by which the flown model had been moved.
+        kept: what the same evidence said before, by tempering; added to.
         tempering: of the evidence; as what is left says if omitted.
         free: free courses of time, by component.
     """
-    data, nothing = total(evidences), np.zeros_like(baseline.precision)
-
-    def tempered(by: float) -> FloatArray:
-        return with_prior(data / by, candidates, baseline.precision, centre)
+    def tempered(by: float) -> Linear:
+        if by not in kept:
+            gram = with_prior(total(evidences) / by, candidates, baseline.precision, centre)
+            kept[by] = Linear(gram, candidates, tuple(untestable), np.zeros_like(baseline.precision))
+        return kept[by]
 
     if tempering is None:
-        left = least_misfit(tempered(1.0), candidates, tuple(untestable), nothing)
-        tempering = max(temper(left, evidences), 1.0)
-    posterior = replace(attribute(tempered(tempering), candidates, tuple(untestable), nothing,
-                                  noise(evidences, tempering), free), tempering=tempering)  # fmt: skip
+        tempering = max(temper(least_misfit(tempered(1.0)), evidences), 1.0)
+    posterior = replace(attribute(tempered(tempering), noise(evidences, tempering), free), tempering=tempering)
     quiet = [name for name, found in posterior.fits.items() if found.smallest is None]
     for name in quiet:
         untestable[name] = "no excitation: these records would not show it anywhere in its range"

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim2real.attribution import attribute, with_prior
+from sim2real.attribution import Linear, attribute, with_prior
 from sim2real.candidates import Bank, bank
 from sim2real.generic import beside
 from sim2real.hypotheses import Posterior
@@ -50,7 +50,7 @@ def flown(sizes: dict[str, float], seed: int = 0, other: float = 0.0) -> tuple[B
 
 def weighed(sizes: dict[str, float], seed: int = 0) -> Posterior:
     candidates, gram = flown(sizes, seed)
-    return attribute(gram, candidates, (), np.zeros((len(candidates.nuisances),) * 2))
+    return attribute(Linear(gram, candidates, (), np.zeros((len(candidates.nuisances),) * 2)))
 
 
 def typical(candidates: Bank, name: str, share: float = 1.0) -> float:
