@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim2real.bends import changes
+from sim2real.bends import apart, changes
 from sim2real.candidates import Bank
 from sim2real.form import home
 from sim2real.hypotheses import Hypothesis, Posterior
@@ -36,7 +36,8 @@ def companions(flying: Flying, linear: Posterior, first: SetFit, point: Point) -
     """Effects to fly beside a single one, with their sizes there.
 
     What explains most of what it leaves; of what no free course of time would explain where it enters (its own form
-    would hide a second one); and what changes a number that went as far as a nuisance may.
+    would hide a second one); what a path tells, whatever the flight leaves; and what changes a number that went as far
+    as a nuisance may.
     """
     out: dict[str, EffectFit] = {}
     moving = suspects(flying, linear, point)
@@ -50,8 +51,9 @@ def companions(flying: Flying, linear: Posterior, first: SetFit, point: Point) -
                     continue
                 if name not in best or fit.log_evidence > best[name].log_evidence:
                     best[name] = fit
-        promising = sorted(best.values(), key=lambda fit: -fit.log_evidence)[:COMPANIONS]
-        out |= {fit.family.effect.name: fit for fit in promising if fit.log_evidence > LEAST_ADDED}
+        promising = sorted(best.values(), key=lambda fit: -fit.log_evidence)
+        chosen = [fit for k, fit in enumerate(promising) if k < COMPANIONS or apart(fit.family.effect)]
+        out |= {fit.family.effect.name: fit for fit in chosen if fit.log_evidence > LEAST_ADDED}
         out |= {name: best[name] for name in moving if name in best}
     return [_in_bank(fit, flying.candidates) for fit in out.values()]
 

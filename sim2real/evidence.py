@@ -113,12 +113,13 @@ def to_fly(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...] = ())
 
 
 def told(flight: Reconstruction, left: FloatArray, moved: Sequence[int], count: int, gain: Gain, factor: FloatArray,
-         keep: Sequence[int] = (), linear: Responses = NONE) -> Evidence:
+         keep: Sequence[int] = (), linear: Responses = NONE, gram: bool = True) -> Evidence:
     """What innovations tell.
 
     Args:
         left: innovations of the rows `moved`, of `count` in all, perhaps with more behind them [N-1, rows, channels].
         keep, linear: as for `compare`.
+        gram: whether inner products are wanted, and not the kept rows alone.
     """
     index = {row: i for i, row in enumerate([*moved, *linear.rows])}
     first = round(SETTLE / flight.dt)
@@ -136,14 +137,15 @@ def told(flight: Reconstruction, left: FloatArray, moved: Sequence[int], count: 
         samples += float(np.sum((whitened[k : k + CHUNK] != 0.0) @ worth))
         means.take(flat, k - first)
         kept[(k - first) * len(MEASURED) :][: len(flat), at[:, 0]] = flat[:, at[:, 1]]
-        inner += flat.T @ flat
+        if gram:
+            inner += flat.T @ flat
     if means.told:
         inner -= means.energy()
         kept[:, at[:, 0]] -= means.over_time(at[:, 1].tolist())
         whitened[first:] -= means.over_time([0]).reshape(-1, len(MEASURED))
-    gram = np.zeros((count, count))
-    gram[np.ix_([*index], [*index])] = inner
-    return Evidence(gram, gain, factor, samples, whitened, flight, kept)
+    whole = np.zeros((count, count))
+    whole[np.ix_([*index], [*index])] = inner
+    return Evidence(whole, gain, factor, samples, whitened, flight, kept)
 
 
 def flown_rows(flight: Reconstruction, rows: FloatArray, pushed: set[int]) -> list[int]:

@@ -154,18 +154,23 @@ def squares(fit: SetFit, inner: FloatArray) -> list[float]:
     return found
 
 
-def energies(own: Sequence[float], explained: float) -> list[float]:
+def energies(own: Sequence[float], explained: float, missed: Sequence[float] = ()) -> list[float]:
     """The same, together no more than a set explains; of one alone all of that.
 
-    Two effects that cancel each other explain the less, however large each of them is.
+    Two effects that cancel each other explain the less, however large each of them is, and none explains more than the
+    set would miss without it.
+
+    Args:
+        missed: that square by member, where it is known.
     """
     if len(own) == 1:
         return [explained]
-    return [square * min(explained / max(sum(own), 1e-12), 1.0) for square in own]
+    shared = [square * min(explained / max(sum(own), 1e-12), 1.0) for square in own]
+    return [min(of, most) for of, most in zip(shared, missed or [np.inf] * len(own), strict=True)]
 
 
 def room(fit: SetFit, own: Sequence[float], bending: Sequence[float], terms: Sequence[Term], kept: FloatArray,
-         nothing: float) -> FloatArray:
+         nothing: float, missed: Sequence[float] = ()) -> FloatArray:
     """Whitened square that each term may take where rho is one [terms].
 
     Every member shares the square of its own signature (`energies`) among the terms where it enters.
@@ -177,8 +182,9 @@ def room(fit: SetFit, own: Sequence[float], bending: Sequence[float], terms: Seq
         bending: of `may_bend`.
         kept: share of each term's own square that nuisances leave [terms].
         nothing: whitened square that no explanation leaves.
+        missed: of `energies`.
     """
-    most = energies(own, max(nothing - fit.misfit, 0.0))
+    most = energies(own, max(nothing - fit.misfit, 0.0), missed)
     out = np.zeros(len(terms))
     for family, square, energy, whole in zip(fit.families, own, most, bending, strict=True):
         energy = min(square, energy)

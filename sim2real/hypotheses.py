@@ -12,6 +12,7 @@ from scipy.special import logsumexp, softmax
 
 from icing_env import effects
 from icing_env.record import FloatArray
+from sim2real.bends import apart
 from sim2real.form import LEAST, MOSTLY, OTHER_FORM, SHAPE, SHARES, Form, alike, at_home, forgiven
 from sim2real.generic import UnknownFit
 from sim2real.paths import PATHS
@@ -189,15 +190,23 @@ def _leaking(found: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Company of effects that are in another form themselves, less what such a form leaves elsewhere.
 
     No form is wholly a free course at the effect's own place; what it leaves at others goes with it, and is no second
-    gap. An effect that is the library's leaves nothing.
+    gap. An effect that is the library's leaves nothing, and neither do paths in flights or flights in paths.
     """
     bent = {h.effects: h.regained for h in found if h.effects and h.unknown is None}
 
     def smaller(h: Hypothesis) -> list[float]:
         most = len(h.effects) - (h.unknown is None)
-        return [bent.get(some, 0.0) for n in range(1, most + 1) for some in combinations(h.effects, n)]
+        return [bent.get(some, 0.0) for n in range(1, most + 1) for some in combinations(h.effects, n)
+                if _reaches(some, [name for name in h.effects if name not in some], h.unknown)]  # fmt: skip
 
     return [replace(h, regained=h.regained - elsewhere(max(smaller(h), default=0.0))) for h in found]
+
+
+def _reaches(some: Sequence[str], company: Sequence[str], unknown: UnknownFit | None) -> bool:
+    """Whether what some effects leave could be told as others, or as something unknown."""
+    flown = [not apart(effects.LIBRARY[name]) for name in company]
+    flown += [] if unknown is None else [unknown.component not in PATHS[:-1]]
+    return any(flown) and not all(apart(effects.LIBRARY[name]) for name in some)
 
 
 def elsewhere(regained: float) -> float:

@@ -103,14 +103,17 @@ class Flying:
         return Abreast(self.flights, [e.gain for e in self.evidences])
 
     def _flown(self, rows: Sequence[NDArray], pushed: Sequence[tuple[Push, ...]] = (),
-               keep: Sequence[int] = ()) -> list[Evidence]:  # fmt: skip
-        """What rows flown along the records abreast tell, but for the paths; as `evidence.flown` does for one."""
+               keep: Sequence[int] = ()) -> list[FloatArray]:  # fmt: skip
+        """The rows to keep of those flown along the records abreast, paths and inner products left out."""
         chosen = [to_fly(f, own, pushes)
                   for f, own, pushes in zip(self.flights, rows, pushed or [()] * len(rows), strict=True)]
         made = self._abreast.innovations([own[moved] for own, (moved, _) in zip(rows, chosen, strict=True)],
                                          [pushes for _, pushes in chosen])
-        return each(lambda flight, left, which, own, e: told(flight, left, which[0], len(own), e.gain, e.factor, keep),
-                    self.flights, made, chosen, rows, self.evidences)
+
+        def of_record(flight: Reconstruction, left: FloatArray, moved: list[int], e: Evidence) -> FloatArray:
+            return told(flight, left, moved, len(rows[0]), e.gain, e.factor, keep, gram=False).rows
+
+        return each(of_record, self.flights, made, [moved for moved, _ in chosen], self.evidences)
 
     @cached_property
     def few(self) -> Bank:
@@ -177,7 +180,7 @@ class Flying:
         steps = size_steps(fit, sizes)
         gram, count = np.zeros((1 + k + n, 1 + k + n)), 1 + k if slopes else 1 + k + n
         rows = [_rows(f, self.candidates, fit, sizes, steps, nuisances)[:count] for f in self.flights]
-        made = [e.rows for e in self._flown(rows, keep=range(count))]
+        made = self._flown(rows, keep=range(count))
         slopes = slopes or self._slopes([own[:, 1 + k :] / NUISANCE_STEP for own in made])
         made = [own[:, : 1 + k] for own in made]
         for flight, own, left, lent in zip(self.flights, rows, made, slopes, strict=True):
@@ -193,7 +196,7 @@ class Flying:
         if not sets:
             return []
         counts = [1 + len(sizes) for _, sizes, _ in sets]
-        n, count = len(self.candidates.nuisances), 1 + sum(counts)
+        count = 1 + sum(counts)
         own = np.zeros((count, count - 1))  # the sets' rows and steps, from those flown and their departures
         at = np.cumsum([1, *counts])
         for first, after in zip(at, at[1:], strict=False):
@@ -201,22 +204,26 @@ class Flying:
             own[np.arange(first + 1, after), np.arange(first, after - 1)] = 1.0
             own[first, first : after - 1] = -1.0
 
-        def of_record(flight: Reconstruction, rows: NDArray, made: Evidence, lent: Slopes) -> FloatArray:
-            inner = made.gram + path_gram(flight, rows, (), round(SETTLE / flight.dt))
-            across = own.T @ (made.rows.T @ lent.rows)
-            return np.asarray(np.block([[own.T @ inner @ own, across], [across.T, lent.inner]]))
+        def of_record(flight: Reconstruction, rows: NDArray, made: FloatArray, lent: Slopes) -> list[FloatArray]:
+            paths = own.T @ path_gram(flight, rows, (), round(SETTLE / flight.dt)) @ own
+            left = made[:, 1:].copy()  # differences of rows: those of inner products round, where flights depart
+            for first, after in zip(at, at[1:], strict=False):
+                left[:, first : after - 1] -= made[:, first : first + 1]
+                left[:, first - 1] += made[:, 0]
+            across, found = left.T @ lent.rows, []
+            for first, after in zip(at, at[1:], strict=False):
+                of_set = slice(first - 1, after - 1)
+                inner = left[:, of_set].T @ left[:, of_set] + paths[of_set, of_set]
+                found.append(np.block([[inner, across[of_set]], [across[of_set].T, lent.inner]]))
+            return found
 
         rows = [end_to_end([flight.parameters, *(
             _rows(flight, self.candidates, fit, sizes, size_steps(fit, sizes), nuisances)[: 1 + len(sizes)]
             for fit, sizes, nuisances in sets)]) for flight in self.flights]
         made = self._flown(rows, keep=range(count))
-        total = np.sum(each(of_record, self.flights, rows, made, self.near), axis=0) / self.tempering
-        out = []
-        for (fit, sizes, nuisances), first, after in zip(sets, at, at[1:], strict=False):
-            chosen = np.r_[first - 1 : after - 1, count - 1 : count - 1 + n]
-            point = self._weighed(fit, sizes, nuisances, total[np.ix_(chosen, chosen)])
-            out.append(replace(point, slopes=self.near))
-        return out
+        grams = each(of_record, self.flights, rows, made, self.near)
+        return [replace(self._weighed(fit, sizes, nuisances, np.sum(parts, axis=0) / self.tempering), slopes=self.near)
+                for (fit, sizes, nuisances), *parts in zip(sets, *grams, strict=True)]
 
     def _weighed(self, fit: SetFit, sizes: FloatArray, nuisances: FloatArray, gram: FloatArray) -> Point:
         """A point from the inner products of what it leaves, of a step of each size and of a nuisance's deviation."""
@@ -246,7 +253,7 @@ class Flying:
         pushed = self.courses.pushed(terms, point.weights, 1 + k)
         moved_to = [_rows(flight, self.candidates, fit, point.sizes, point.steps, point.nuisances)[: 1 + k]
                     for flight in self.flights]
-        made = [e.rows for e in self._flown(moved_to, pushed, range(1 + k))] if point.weights else point.rows
+        made = self._flown(moved_to, pushed, range(1 + k)) if point.weights else point.rows
         for flight, rows, own, slopes, (generic, inner) in zip(
                 self.flights, moved_to, made, point.slopes, self.courses.of_terms(terms), strict=True):
             for component, over in excess(flight, rows[:1]).items():

@@ -55,7 +55,7 @@ from sim2real.hypotheses import (
 from sim2real.other_form import Bent, flown_squares, flown_unknown, other_form
 from sim2real.points import Flying
 from sim2real.sets import SetFit
-from sim2real.steps import Place, Point
+from sim2real.steps import Places, Point
 from sim2real.tempering import noise
 from sim2real.terms import in_what_is_left
 
@@ -71,7 +71,7 @@ def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior:
 
     Args:
         start: nuisances [n] that a hypothesis is settled from.
-        places: where sets of several settled before, by effects and parameters: those are settled from there; added to.
+        places: where sets settled before: they are settled from there; added to.
     """
     search = _Search(flying, start, posterior, places)
     search.fly([search.nothing_at_all(), *(search.found.index(h) for h in leading(posterior))])
@@ -79,9 +79,6 @@ def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior:
     while len(search.points) < MOST and (following := search.following()) is not None:
         search.fly([following])
     return search.posterior()
-
-
-Places = dict[tuple[tuple[str, str], ...], Place]  # by effects and their parameters
 
 
 class _Search:
@@ -151,15 +148,9 @@ class _Search:
             self.nothing = h.fit.misfit
 
     def _settled(self, i: int, h: Hypothesis) -> Point:
-        fit, own = h.fit, tuple((f.effect.name, f.parameter.name) for f in h.fit.families)
-        if own in self.places:
-            sizes, nuisances = self.places[own]
-            fit = replace(fit, estimate=tuple(sizes))
-        else:
-            nuisances = self.beginning[i] if i in self.beginning else self.start(h)
+        fit, nuisances = self.places.begin(h.fit, self.beginning[i] if i in self.beginning else self.start(h))
         point = self.flying.settle(fit, nuisances)
-        if len(own) > 1:
-            self.places[own] = point.sizes, point.nuisances
+        self.places.keep(h.fit, point)
         return point
 
     def _form(self, i: int, h: Hypothesis, left: FloatArray) -> Form:
@@ -182,9 +173,16 @@ class _Search:
         # by slope or bank, the less: polynomials bend between sizes, and slopes are not those of smaller ones
         flown = flown_squares(h.fit, Bent(self.points[i], self.left[i]))
         reduced = squares(h.fit, self.linear.reduced)
-        beyond = energies(list(map(min, flown[0], reduced)), self.nothing - h.fit.misfit)
+        missed = self._missed(h.fit)
+        beyond = energies(list(map(min, flown[0], reduced)), self.nothing - h.fit.misfit, missed)
         bending = may_bend(beyond, list(map(min, flown[1], squares(h.fit, raw))))
-        return rows, room(h.fit, reduced, bending, own, kept, self.nothing)
+        return rows, room(h.fit, reduced, bending, own, kept, self.nothing, missed)
+
+    def _missed(self, fit: SetFit) -> list[float]:
+        """Whitened square that a set leaves more without each of its members, where that is known."""
+        left = {h.effects: h.fit.misfit for h in self.found if h.unknown is None}
+        rest = [tuple(sorted(name for name in fit.effects if name != own)) for own in fit.effects]
+        return [max(left.get(names, np.inf) - fit.misfit, 0.0) for names in rest]
 
     def _free(self, fit: SetFit, left: Remainder, beside: UnknownFit | None = None) -> tuple[Liberty, ...]:
         """What free courses of time would take: at home of each effect, or where something unknown is; then at all.
@@ -194,7 +192,7 @@ class _Search:
         """
         each = [home((family.effect.name,)) for family in fit.families]
         most = [FORGIVEN**2 * e for e in energies(squares(fit, self.linear.reduced),
-                                                       max(self.nothing - fit.misfit, 0.0))]
+                                                       max(self.nothing - fit.misfit, 0.0), self._missed(fit))]
         whole = float(left.reduced()[0, 0])
         rest = whole if beside is None else beside.left
         if beside is not None:

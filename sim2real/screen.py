@@ -18,7 +18,7 @@ from sim2real.corrections import corrected, inherited
 from sim2real.form import Form
 from sim2real.hypotheses import Hypothesis, Posterior, forgive, normalised
 from sim2real.points import Flying
-from sim2real.steps import FARTHEST, Point
+from sim2real.steps import FARTHEST, Places, Point
 
 SETS, TURNS = 8, 3  # sets of several flown side by side, and how often, until one that was flown looks best
 # Slopes are flown anew for up to MOST that are within so much log likelihood, or such a share of what is explained, of
@@ -27,20 +27,22 @@ CLOSE, SHARE, MOST = 15.0, 0.3, 4
 Points = Mapping[tuple[str, ...], Point]
 
 
-def screen(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior: Posterior) -> Points:
+def screen(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior: Posterior, places: Places) -> Points:
     """None, every single effect and some sets, each where it fits best, by the names of their effects.
 
     Args:
         start: best nuisances [n] of a hypothesis as far as the linear fit knows.
         posterior: of the linear fit.
+        places: where sets settled before.
     """
     known = {h.effects: h for h in posterior.hypotheses if h.unknown is None}
     points: dict[tuple[str, ...], Point] = {}
 
     def fly(names: Iterable[tuple[str, ...]]) -> None:
         chosen = [known[own] for own in names]
-        starts = [np.clip(start(h), -FARTHEST, FARTHEST) for h in chosen]
-        points.update(zip(names, flying.descended([h.fit for h in chosen], starts), strict=True))
+        begun = [places.begin(h.fit, np.clip(start(h), -FARTHEST, FARTHEST)) for h in chosen]
+        fits, starts = [fit for fit, _ in begun], [nuisances for _, nuisances in begun]
+        points.update(zip(names, flying.descended(fits, starts), strict=True))
 
     fly([names for names in known if len(names) < 2])
     for _ in range(TURNS):

@@ -61,14 +61,24 @@ def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Base
     A model that is no longer corrected enough to keep to a record departs from it, and nothing can be told of what
     departs. Its filter has to expect more noise, though some of a gap may pass for that.
     """
-    model = replace(candidates, nuisances=(), families=(), terms=(), size=1)
     for least in WALKS:
         flights = [replace(f, inadequacy=f.inadequacy.with_walk(least)) for f in flights]
         centre, known = settle(flights, candidates, baseline)
-        left = each(lambda flight, gain: gather(flight, model, gain), about(flights, candidates, centre), known)
-        if all(float(e.gram[0, 0]) < DEPARTED * e.samples for e in left):
+        if not departs(model_alone(flights, candidates, centre, known)):
             break
     return list(flights), centre, known
+
+
+def model_alone(flights: Sequence[Reconstruction], candidates: Bank, centre: FloatArray, known: Sequence[Gain]
+                ) -> list[Evidence]:  # fmt: skip
+    """Evidence of every record of the model alone, moved by `centre` [n] standard deviations."""
+    model = replace(candidates, nuisances=(), families=(), terms=(), size=1)
+    return each(lambda flight, gain: gather(flight, model, gain), about(flights, candidates, centre), known)
+
+
+def departs(evidences: Sequence[Evidence]) -> bool:
+    """Whether the model does not follow some record."""
+    return any(not float(e.gram[0, 0]) < DEPARTED * e.samples for e in evidences)
 
 
 def likeliest(flight: Reconstruction, last: Gain, pushed: Sequence[Push] = ()) -> Gain:

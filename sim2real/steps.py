@@ -84,6 +84,28 @@ class Point:
         return replace(self, slope=slope, information=holding(at, self.information))
 
 
+class Places:
+    """Where sets settled, by their effects and parameters: what is flown again begins there."""
+
+    def __init__(self) -> None:
+        self.kept: dict[tuple[tuple[str, str], ...], Place] = {}
+
+    def keep(self, fit: SetFit, point: Point) -> None:
+        """Remember where a set settled."""
+        self.kept[_named(fit)] = point.sizes, point.nuisances
+
+    def begin(self, fit: SetFit, nuisances: FloatArray) -> tuple[SetFit, FloatArray]:
+        """A set with sizes, and nuisances [n], to begin from: those given where it has not settled yet."""
+        if _named(fit) not in self.kept:
+            return fit, nuisances
+        sizes, settled = self.kept[_named(fit)]
+        return replace(fit, estimate=tuple(sizes)), settled
+
+
+def _named(fit: SetFit) -> tuple[tuple[str, str], ...]:
+    return tuple((f.effect.name, f.parameter.name) for f in fit.families)
+
+
 def holding(rows: NDArray[np.intp], gram: FloatArray) -> FloatArray:
     """Inner products where some rows are constants that give way no more."""
     out = gram.copy()

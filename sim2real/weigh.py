@@ -20,11 +20,11 @@ from sim2real.kalman import Gain
 from sim2real.points import Flying
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
-from sim2real.refine import Places, refine
+from sim2real.refine import refine
 from sim2real.screen import Points, screen, screened
-from sim2real.settling import differ, followed, gains_with, gather_about, length, nearer
+from sim2real.settling import departs, differ, followed, gains_with, gather_about, length, model_alone, nearer
 from sim2real.singles import fit_family
-from sim2real.steps import FARTHEST
+from sim2real.steps import FARTHEST, Places
 from sim2real.tempering import noise, temper, total
 from sim2real.varying import varying
 
@@ -49,14 +49,15 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
     progress("fitting the model's own uncertainty")
     flights, centre, known = followed(flights, candidates, baseline)
     found = _Weighing(flights, candidates, baseline, untestable, centre)
-    known = first_guess(flights, candidates, baseline, untestable, centre, known)
+    guess = first_guess(flights, candidates, baseline, untestable, centre, known)
     progress(f"flying {candidates.size} variants along {len(flights)} records")
-    found.gather(known)
+    found.gather(guess)
     for _ in range(AGAIN):
         if not found.judged():
             break
         progress("flying the variants again, gusts judged with the best explanation")
-        found.gather(found.known)
+        if not found.gather(found.known):
+            break
     progress("looking for what no generic term follows")
     found.weigh_courses()
     untestable |= found.quiet
@@ -93,7 +94,8 @@ def first_guess(flights: Sequence[Reconstruction], candidates: Bank, baseline: B
     best = min(range(len(points)), key=lambda i: points[i].cost)
     point = points[best]
     fit = replace(alone[best], estimate=tuple(point.sizes))
-    return gains_with(flying, Hypothesis(fit, None, 0.0, 0.0), point.nuisances, 1)
+    found = gains_with(flying, Hypothesis(fit, None, 0.0, 0.0), point.nuisances, 1)
+    return known if departs(model_alone(flights, few, centre, found)) else found
 
 
 class _Weighing:
@@ -102,7 +104,6 @@ class _Weighing:
     known: gains of the best explanation, once it has been flown; quiet: effects that these records do not show.
     """
 
-    evidences: list[Evidence]
     along: list[Course]
     posterior: Posterior
 
@@ -112,16 +113,25 @@ class _Weighing:
         self.untestable, self.centre = untestable, centre
         self.known: list[Gain] | None = None
         self.quiet = dict(untestable)
+        self.evidences: list[Evidence] = []
         self.points: Points = {}
         self.linear: dict[float, Linear] = {}
-        self.places: Places = {}
+        self.places = Places()
 
-    def gather(self, known: Sequence[Gain] | None, tempering: float | None = None) -> None:
-        """Fly the variants about the centre, with gains (and tempering) where known, and weigh what they say."""
-        self.evidences = gather_about(self.flights, self.candidates, self.centre, known)
+    def gather(self, known: Sequence[Gain] | None, tempering: float | None = None) -> bool:
+        """Fly the variants about the centre, with gains (and tempering) where known, and weigh what they say.
+
+        Returns:
+            Whether that is believed: with gains of an explanation, the model without it may depart from the records.
+        """
+        flown = gather_about(self.flights, self.candidates, self.centre, known)
+        if departs(flown) and self.evidences:
+            return False
+        self.evidences = flown
         self.along = [Course(e) for e in self.evidences]
         self.points, self.linear = {}, {}
         self._weigh(tempering)
+        return True
 
     def weigh_courses(self) -> None:
         """Weigh once more, free courses of time among what is unknown."""
@@ -135,7 +145,7 @@ class _Weighing:
                        tempering, free)
         if not self.points or linear.tempering != self.posterior.tempering:
             self.posterior = linear
-            self.points = screen(self._flying(), self.start, linear)
+            self.points = screen(self._flying(), self.start, linear, self.places)
         self.posterior = screened(linear, self.points)
 
     def _gram(self) -> FloatArray:
@@ -190,9 +200,7 @@ class _Weighing:
         calm = temper(self.posterior.bare * self.posterior.tempering, self.evidences)
         if not worth and calm >= CALMER * self.posterior.tempering:
             return False
-        if worth:
-            self.gather(self.known, calm)
-        else:
+        if not (worth and self.gather(self.known, calm)):
             self._weigh(calm)
         self.weigh_courses()
         return True
