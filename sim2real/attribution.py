@@ -18,6 +18,7 @@ import numpy as np
 from icing_env.record import FloatArray
 from sim2real.any_course import with_courses
 from sim2real.candidates import NUISANCE_STEP, Bank
+from sim2real.forgiveness import forgive
 from sim2real.form import Form, may_bend, own_terms, room, shares, split, squares, with_terms
 from sim2real.generic import UnknownFit, beside, fit_unknown
 from sim2real.home_terms import gain, without
@@ -29,7 +30,6 @@ from sim2real.hypotheses import (
     P_UNKNOWN,
     Hypothesis,
     Posterior,
-    forgive,
     homes,
     normalised,
     set_prior,

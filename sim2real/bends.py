@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 from icing_env import aircraft
 from icing_env.effects import Effect, Parameter
 from icing_env.types import DERIVATIVE_NAMES
-from sim2real.predictor import held
 
-STEP = 0.02  # s, any
 COMPONENTS = {"CX": "x_force", "CY": "y_force", "CZ": "z_force", "Cl": "rolling_moment", "Cm": "pitching_moment",
               "Cn": "yawing_moment"}  # fmt: skip
 
@@ -25,19 +23,9 @@ COMPONENTS = {"CX": "x_force", "CY": "y_force", "CZ": "z_force", "Cl": "rolling_
 @cache
 def changes(effect: Effect) -> frozenset[str]:
     """Numbers of the aircraft (of PARAMETERS) that an effect changes."""
-    plain = _plain()
-    row = plain.copy()
-    effect.apply(row, effect.neutral() | {p.name: _some(p) for p in effect.parameters})
-    return frozenset(name for name in row.dtype.names or () if np.any(row[name] != plain[name]))
-
-
-@cache
-def apart(effect: Effect) -> bool:
-    """Whether flights along recorded positions and powers do not know of an effect: its path alone tells of it."""
-    plain = _plain()
-    row = plain.copy()
-    effect.apply(row, effect.neutral() | {p.name: _some(p) for p in effect.parameters})
-    return held(row, STEP).tobytes() == held(plain, STEP).tobytes()
+    row = plain().copy()
+    effect.apply(row, effect.neutral() | {p.name: some(p) for p in effect.parameters})
+    return frozenset(name for name in row.dtype.names or () if np.any(row[name] != plain()[name]))
 
 
 @cache
@@ -50,10 +38,11 @@ def bends(effect: Effect) -> frozenset[tuple[str, str]]:
 
 
 @cache
-def _plain() -> NDArray:
+def plain() -> NDArray:
+    """The published aircraft."""
     return aircraft.load()
 
 
-def _some(parameter: Parameter) -> float:
+def some(parameter: Parameter) -> float:
     """A size that is not neutral."""
     return parameter.typical or 0.5 * (parameter.neutral + max(parameter.low, parameter.high, key=abs))

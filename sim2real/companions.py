@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
 
-from sim2real.bends import apart, changes
-from sim2real.candidates import Bank
+from icing_env.record import FloatArray
+from sim2real.attribution import reduce, with_prior
+from sim2real.bends import changes
+from sim2real.candidates import Bank, parameter_rows
+from sim2real.courses import Course, in_time
+from sim2real.devices import apart
+from sim2real.evidence import SETTLE, Evidence, compare
 from sim2real.form import home
 from sim2real.hypotheses import Hypothesis, Posterior
-from sim2real.points import Flying
+from sim2real.paths import of_paths, path_gram
+from sim2real.points import Flying, rows_of
+from sim2real.reconstruct import Reconstruction
 from sim2real.sets import SetFit
+from sim2real.side_by_side import each
 from sim2real.singles import EffectFit, fit_family
 from sim2real.sizes import flown_weights
-from sim2real.steps import Point
+from sim2real.steps import Point, holding
 
 LEADING, LIKELY = 2, 0.02  # explanations that are flown again, and how probable they have to be
 CERTAIN = 0.05  # probability of no gap above which nothing is: sizes near zero have no likelihood of Gaussian shape
@@ -41,7 +50,7 @@ def companions(flying: Flying, linear: Posterior, first: SetFit, point: Point) -
     """
     out: dict[str, EffectFit] = {}
     moving = suspects(flying, linear, point)
-    for reduced in flying.beside(first, point, home(first.effects)):
+    for reduced in _library_beside(flying, first, point, home(first.effects)):
         best: dict[str, EffectFit] = {}
         for family in flying.few.families:
             name = family.effect.name
@@ -56,6 +65,28 @@ def companions(flying: Flying, linear: Posterior, first: SetFit, point: Point) -
         out |= {fit.family.effect.name: fit for fit in chosen if fit.log_evidence > LEAST_ADDED}
         out |= {name: best[name] for name in moving if name in best}
     return [_in_bank(fit, flying.candidates) for fit in out.values()]
+
+
+def _library_beside(flying: Flying, fit: SetFit, point: Point, home: Collection[str]) -> list[FloatArray]:
+    """Inner products of every effect of the library (rows of `Flying.few`) about a set where it was flown.
+
+    Then the same without what free courses of time at `home`, or a path there, would explain.
+    """
+    only, names = flying.few, in_time(home)
+
+    def of_record(flight: Reconstruction, evidence: Evidence, course: Course) -> tuple[FloatArray, FloatArray]:
+        still = np.zeros(len(point.sizes))
+        at = rows_of(flight, flying.candidates, fit, point.sizes, still, point.nuisances)[:1]
+        rows = parameter_rows(replace(flight, parameters=at), only)
+        found = compare(flight, rows, evidence.gain, evidence.factor, keep=range(len(rows)))
+        own = path_gram(of_paths(flight, home), rows, (), round(SETTLE / flight.dt)) / flying.tempering
+        courses = course.taken(names, [found.rows], flying.tempering, again=False) if names else 0.0
+        return found.gram / flying.tempering, own + courses
+
+    total, taken = np.sum(each(of_record, flying.flights, flying.evidences, flying.courses.along), axis=0)
+    prior, nothing = flying.baseline.precision, np.zeros_like(flying.baseline.precision)
+    return [reduce(holding(1 + point.held, with_prior(gram, only, prior, point.nuisances)), only, nothing)
+            for gram in (total, total - taken)]
 
 
 def _in_bank(fit: EffectFit, candidates: Bank) -> EffectFit:

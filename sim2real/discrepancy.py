@@ -32,7 +32,7 @@ from sim2real.singles import DETECTABLE
 from sim2real.terms import DEVIATION, FROM_ZERO, GENERIC, GENERIC_SIZE, unit_of
 
 SHOWN = DETECTABLE  # standard errors that a term has to stand out
-ROUNDS = 3  # of fitting: each flies the aircraft described so far
+ROUNDS, SETTLED = 8, 0.5  # of fitting at most, each flying the aircraft described so far; whitened square worth one
 RIDGE = 0.1  # prior precision of a term in its own unit (assumed: a standard deviation of three)
 LATE = ("_dot", "acceleration", "slow_phi", "slow_theta", "slow_ax", "slow_ay")  # terms with a memory
 SCALE, DELAY = 0.1, 0.1  # unit of a channel's scale error, and s of its delay
@@ -167,11 +167,14 @@ def describe_unknown(flights: Sequence[Reconstruction], candidates: Bank, eviden
         if cost > best and np.any(step):  # too far: half the way from where it was better
             step, turn = 0.5 * step, 0.5 * (turn + centre)
             continue
+        gained = best - cost
         x, best, centre = x + step, cost, turn
         target, chosen, covariance = choose(reduced, first, x)
         step = target - x
         weights = {first + j: float(step[j]) for j in range(n)}
         turn = nearer(centre + nuisance_mean(gram, only, weights), only)
+        if gained < SETTLED:
+            break
     return _written(component, terms, at, x + step, chosen, covariance)
 
 

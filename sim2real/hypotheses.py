@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import combinations
 
 import numpy as np
 from scipy.special import logsumexp, softmax
 
-from icing_env import effects
 from icing_env.record import FloatArray
-from sim2real.bends import apart
-from sim2real.form import LEAST, MOSTLY, OTHER_FORM, SHAPE, SHARES, Form, alike, at_home, forgiven
+from sim2real.devices import within
+from sim2real.form import LEAST, MOSTLY, SHAPE, Form, alike, at_home
 from sim2real.generic import UnknownFit
-from sim2real.paths import PATHS
 from sim2real.sets import SetFit
 from sim2real.singles import EffectFit
 
@@ -25,7 +22,6 @@ SAME_PLACE = 0.02  # of that where two members are faults of one device: another
 # Of the probability, that the evidence misleads: of 46 answers of 0.9 and more to gaps of development, 38 were right.
 DOUBT = 0.14
 NEXT = 0.8  # of the doubt, that it is one of those ranked next, each half as likely as the one before (assumed)
-ELSEWHERE = 10.0  # log evidence that another form leaves elsewhere: 4 to 13 in three answers of a sealed set
 KEPT = 1e-5  # sets of several effects less probable than this are dropped
 
 
@@ -168,96 +164,6 @@ def is_home(h: Hypothesis, unknown: UnknownFit, told: float, explained: float, r
     if len(h.effects) != 1 or h.unknown is not None or not at_home(unknown.component, h.effects):
         return False
     return told > 0.0 and explained > LEAST**2 and (explained > MOSTLY * told or alike(h.fit, unknown, raw) > SHAPE)
-
-
-def forgive(found: Sequence[Hypothesis], nothing: float, least: float, bare: float = 0.0,
-            believed: Collection[int] | None = None) -> list[Hypothesis]:
-    """Hypotheses with what another form, and a remainder that is forgiven, regain.
-
-    Args:
-        nothing: whitened square that no explanation at all leaves.
-        least: what noise alone would leave.
-        bare: the same beside free courses of time, where these are known.
-        believed: indices of the sets whose evidence is believed when it serves smaller ones; all if omitted.
-    """
-    alone = [replace(h, regained=_regained(h, nothing, least, bare)) for h in found]
-    larger = alone if believed is None else [alone[i] for i in believed]
-    larger = [h for h in larger if h.unknown is None and len(h.effects) > 1]
-    return _leaking([_with_guests(h, larger, nothing) for h in alone])
-
-
-def _leaking(found: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Company of effects that are in another form themselves, less what such a form leaves elsewhere.
-
-    No form is wholly a free course at the effect's own place; what it leaves at others goes with it, and is no second
-    gap. An effect that is the library's leaves nothing, and neither do paths in flights or flights in paths.
-    """
-    bent = {h.effects: h.regained for h in found if h.effects and h.unknown is None}
-
-    def smaller(h: Hypothesis) -> list[float]:
-        most = len(h.effects) - (h.unknown is None)
-        return [bent.get(some, 0.0) for n in range(1, most + 1) for some in combinations(h.effects, n)
-                if _reaches(some, [name for name in h.effects if name not in some], h.unknown)]  # fmt: skip
-
-    return [replace(h, regained=h.regained - elsewhere(max(smaller(h), default=0.0))) for h in found]
-
-
-def _reaches(some: Sequence[str], company: Sequence[str], unknown: UnknownFit | None) -> bool:
-    """Whether what some effects leave could be told as others, or as something unknown."""
-    flown = [not apart(effects.LIBRARY[name]) for name in company]
-    flown += [] if unknown is None else [unknown.component not in PATHS[:-1]]
-    return any(flown) and not all(apart(effects.LIBRARY[name]) for name in some)
-
-
-def elsewhere(regained: float) -> float:
-    """Log evidence that another form which regains so much may leave at other places: as much at most, and slowly more.
-
-    ELSEWHERE, and that again for each ten times of it that the form regains (assumed).
-    """
-    more = max(regained, 0.0) / ELSEWHERE
-    return ELSEWHERE * min(more, 1.0 + float(np.log10(max(more, 1.0))))
-
-
-def _with_guests(h: Hypothesis, larger: Sequence[Hypothesis], nothing: float) -> Hypothesis:
-    """A set with what larger ones gain by a member that enters nowhere but where one of its own does.
-
-    An actuator of second order looks like lag with some gearing: a little of another effect, at the same place as one
-    that explains most, is another form of that.
-    """
-    if not h.effects or h.unknown is not None:
-        return h
-    own = set(h.effects)
-    gained = [g.log_evidence + g.regained - h.log_evidence for g in larger
-              if len(g.effects) == len(own) + 1 and own < set(g.effects)
-              and all(within(name, h.effects) for name in set(g.effects) - own)
-              and nothing - h.fit.misfit > MOSTLY * (nothing - g.fit.misfit)]
-    if not gained:
-        return h
-    return replace(h, regained=float(np.logaddexp(h.regained, max(gained) + np.log(OTHER_FORM / len(SHARES)))))
-
-
-def within(name: str, others: Sequence[str]) -> bool:
-    """Whether an effect enters at one device alone (an actuator, an engine, an instrument) where another one does.
-
-    Two faults of one device at once are rarer than one of another form; along an axis of the air's forces they are not.
-    The load is such a device: one that is not as stated changes mass, its centre and inertia together.
-    """
-    places = effects.LIBRARY[name].enters_at
-    device = len(places) == 1 and (places[0].startswith("sensor:") or places[0] in (*PATHS, "mass"))
-    return device and any(places[0] in effects.LIBRARY[other].enters_at for other in others)
-
-
-def _regained(h: Hypothesis, nothing: float, least: float, bare: float) -> float:
-    if h.form is None:
-        return 0.0 if h.unknown is None else forgiven(h.left - least, nothing - h.left)
-    if h.unknown is not None:
-        return h.form.regained(nothing, least, bare)
-    other = h.form.regained(nothing, least, bare)
-    if h.instead is not None:
-        left = h.instead.left
-        alone = h.instead.log_evidence - h.log_evidence + forgiven(left - least, nothing - left)
-        other = float(np.logaddexp(other, alone - np.log(len(SHARES))))
-    return float(np.logaddexp(np.log(1.0 - OTHER_FORM), np.log(OTHER_FORM) + other))
 
 
 def normalised(found: Sequence[Hypothesis], least: float = KEPT) -> tuple[Hypothesis, ...]:

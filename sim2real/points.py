@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.abreast import Abreast, end_to_end
-from sim2real.attribution import reduce, with_prior
-from sim2real.candidates import NUISANCE_STEP, Bank, at_few_sizes, parameter_rows
-from sim2real.courses import Course, Courses, Remainder, in_time
-from sim2real.evidence import SETTLE, Evidence, compare, to_fly, told
-from sim2real.paths import PATHS, excess, of_paths, path_gram
+from sim2real.candidates import NUISANCE_STEP, Bank, at_few_sizes
+from sim2real.courses import Courses, Remainder
+from sim2real.evidence import SETTLE, Evidence, to_fly, told
+from sim2real.paths import PATHS, excess, path_gram
 from sim2real.predictor import Push
 from sim2real.reconstruct import Reconstruction
 from sim2real.references import Baseline
@@ -34,7 +33,6 @@ from sim2real.steps import (
     Slopes,
     descent,
     ends,
-    holding,
     promised,
     ranges,
     size_steps,
@@ -179,7 +177,7 @@ class Flying:
         k, n = len(sizes), len(nuisances)
         steps = size_steps(fit, sizes)
         gram, count = np.zeros((1 + k + n, 1 + k + n)), 1 + k if slopes else 1 + k + n
-        rows = [_rows(f, self.candidates, fit, sizes, steps, nuisances)[:count] for f in self.flights]
+        rows = [rows_of(f, self.candidates, fit, sizes, steps, nuisances)[:count] for f in self.flights]
         made = self._flown(rows, keep=range(count))
         slopes = slopes or self._slopes([own[:, 1 + k :] / NUISANCE_STEP for own in made])
         made = [own[:, : 1 + k] for own in made]
@@ -218,7 +216,7 @@ class Flying:
             return found
 
         rows = [end_to_end([flight.parameters, *(
-            _rows(flight, self.candidates, fit, sizes, size_steps(fit, sizes), nuisances)[: 1 + len(sizes)]
+            rows_of(flight, self.candidates, fit, sizes, size_steps(fit, sizes), nuisances)[: 1 + len(sizes)]
             for fit, sizes, nuisances in sets)]) for flight in self.flights]
         made = self._flown(rows, keep=range(count))
         grams = each(of_record, self.flights, rows, made, self.near)
@@ -251,7 +249,7 @@ class Flying:
         moved = tuple(replace(term, row=first + j) for j, term in enumerate(terms))
         gram, kept, left_in = np.zeros((first + len(terms),) * 2), [], dict.fromkeys(PATHS, 0.0)
         pushed = self.courses.pushed(terms, point.weights, 1 + k)
-        moved_to = [_rows(flight, self.candidates, fit, point.sizes, point.steps, point.nuisances)[: 1 + k]
+        moved_to = [rows_of(flight, self.candidates, fit, point.sizes, point.steps, point.nuisances)[: 1 + k]
                     for flight in self.flights]
         made = self._flown(moved_to, pushed, range(1 + k)) if point.weights else point.rows
         for flight, rows, own, slopes, (generic, inner) in zip(
@@ -271,29 +269,9 @@ class Flying:
         gram[1 : 1 + k, 1 : 1 + k] += (0.1 * SIZE_STEP) ** 2 * np.eye(k)  # sizes move by ten uncertainties
         return Remainder(gram, first, kept, left_in, (*ends(fit, point), *(int(j) for j in 1 + k + point.held)))
 
-    def beside(self, fit: SetFit, point: Point, home: Collection[str]) -> list[FloatArray]:
-        """Inner products of every effect of the library (rows of `few`) about a set where it was flown.
 
-        Then the same without what free courses of time at `home`, or a path there, would explain.
-        """
-        only, names = self.few, in_time(home)
-
-        def of_record(flight: Reconstruction, evidence: Evidence, course: Course) -> tuple[FloatArray, FloatArray]:
-            at = _rows(flight, self.candidates, fit, point.sizes, np.zeros(len(point.sizes)), point.nuisances)[:1]
-            rows = parameter_rows(replace(flight, parameters=at), only)
-            found = compare(flight, rows, evidence.gain, evidence.factor, keep=range(len(rows)))
-            own = path_gram(of_paths(flight, home), rows, (), round(SETTLE / flight.dt)) / self.tempering
-            courses = course.taken(names, [found.rows], self.tempering, again=False) if names else 0.0
-            return found.gram / self.tempering, own + courses
-
-        total, taken = np.sum(each(of_record, self.flights, self.evidences, self.courses.along), axis=0)
-        prior, nothing = self.baseline.precision, np.zeros_like(self.baseline.precision)
-        return [reduce(holding(1 + point.held, with_prior(gram, only, prior, point.nuisances)),
-                       only, nothing) for gram in (total, total - taken)]
-
-
-def _rows(flight: Reconstruction, candidates: Bank, fit: SetFit, sizes: FloatArray, steps: FloatArray,
-          nuisances: FloatArray) -> NDArray:
+def rows_of(flight: Reconstruction, candidates: Bank, fit: SetFit, sizes: FloatArray, steps: FloatArray,
+            nuisances: FloatArray) -> NDArray:
     """PARAMETERS: the set where it is fitted, then a step of each size, then a step of each nuisance."""
     k, n = len(sizes), len(nuisances)
     rows = np.repeat(flight.parameters, 1 + k + n)

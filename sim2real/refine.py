@@ -19,24 +19,17 @@ from sim2real.any_course import beside, with_courses
 from sim2real.companions import companions, leading, together, without
 from sim2real.corrections import corrected, inherited, lost
 from sim2real.courses import Remainder
+from sim2real.forgiveness import forgive
 from sim2real.form import (
-    FORGIVEN,
     OTHER_FORM,
     SHAPE,
     SHARES,
-    UNKNOWN_FORGIVEN,
     WORTH,
     Form,
-    Liberty,
     alike,
-    energies,
     home,
-    may_bend,
-    own_terms,
-    room,
     shares,
     split,
-    squares,
     with_terms,
 )
 from sim2real.generic import UnknownFit, fit_unknown_left
@@ -47,22 +40,20 @@ from sim2real.hypotheses import (
     P_UNKNOWN,
     Hypothesis,
     Posterior,
-    forgive,
     is_home,
     normalised,
     set_prior,
 )
-from sim2real.other_form import Bent, flown_squares, flown_unknown, other_form
+from sim2real.liberty import AtLiberty
+from sim2real.other_form import Bent, flown_unknown, other_form
 from sim2real.points import Flying
 from sim2real.sets import SetFit
 from sim2real.steps import Places, Point
 from sim2real.tempering import noise
-from sim2real.terms import in_what_is_left
 
 MOST = 12  # explanations flown again; what looks better then and has not been flown is not believed
 PART = 0.1  # of what a set is more probable than nothing (in logarithms), that an effect flown for its sake is alone
 TAKEN = 4.0  # whitened square above luck, that generic terms take of what leaves room for a companion (assumed)
-FEW_PLACES = 5  # components at which courses of time are freed together
 
 
 def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior: Posterior,
@@ -143,7 +134,7 @@ class _Search:
         fits = fit_unknown_left(left, self.flying.candidates)
         self.generic[i] = with_courses(fits, beside(self.flying.courses, self.left[i], places))
         if h.effects:
-            self.found[i] = replace(h, form=self._form(i, h, left), instead=None)
+            self.found[i] = replace(h, form=self._form(i, h), instead=None)
         else:
             self.nothing = h.fit.misfit
 
@@ -153,60 +144,21 @@ class _Search:
         self.places.keep(h.fit, point)
         return point
 
-    def _form(self, i: int, h: Hypothesis, left: FloatArray) -> Form:
+    def _form(self, i: int, h: Hypothesis) -> Form:
         """Another form of a flown set, itself flown where it takes much."""
-        flown = Bent(self.points[i], self.left[i])
-        form, bent = other_form(self.flying, h.fit, flown, *self._room(i, h, left), shares(len(h.effects)))
-        form = replace(form, free=self._free(h.fit, self.left[i]))
+        flown, at_liberty = Bent(self.points[i], self.left[i]), self._at_liberty(h.fit)
+        form, bent = other_form(self.flying, h.fit, flown, *at_liberty.room(flown), shares(len(h.effects)))
+        form = replace(form, free=at_liberty.free(self.left[i]))
         if bent is None:
             return form
         self.bent[i] = bent
-        return replace(form, bent=self._free(h.fit, bent.left))
+        return replace(form, bent=at_liberty.free(bent.left))
 
-    def _room(self, i: int, h: Hypothesis, left: FloatArray) -> tuple[list[int], FloatArray]:
-        """Rows of the generic terms at home of a set in what it leaves (`left`), and what `room` there is for each."""
-        bank, raw = self.flying.candidates, self.linear.raw
-        own = own_terms(h.effects, in_what_is_left(bank.terms))
-        rows = [term.row for term in own]
-        whole = raw.diagonal()[[bank.terms[row - 1].row for row in rows]]
-        kept = left.diagonal()[rows] / np.maximum(whole, 1e-9)
-        # by slope or bank, the less: polynomials bend between sizes, and slopes are not those of smaller ones
-        flown = flown_squares(h.fit, Bent(self.points[i], self.left[i]))
-        reduced = squares(h.fit, self.linear.reduced)
-        missed = self._missed(h.fit)
-        beyond = energies(list(map(min, flown[0], reduced)), self.nothing - h.fit.misfit, missed)
-        bending = may_bend(beyond, list(map(min, flown[1], squares(h.fit, raw))))
-        return rows, room(h.fit, reduced, bending, own, kept, self.nothing, missed)
-
-    def _missed(self, fit: SetFit) -> list[float]:
-        """Whitened square that a set leaves more without each of its members, where that is known."""
+    def _at_liberty(self, fit: SetFit) -> AtLiberty:
         left = {h.effects: h.fit.misfit for h in self.found if h.unknown is None}
         rest = [tuple(sorted(name for name in fit.effects if name != own)) for own in fit.effects]
-        return [max(left.get(names, np.inf) - fit.misfit, 0.0) for names in rest]
-
-    def _free(self, fit: SetFit, left: Remainder, beside: UnknownFit | None = None) -> tuple[Liberty, ...]:
-        """What free courses of time would take: at home of each effect, or where something unknown is; then at all.
-
-        What a member may leave there goes with what it explains: one that explains little would else be named for the
-        freedom of its home.
-        """
-        each = [home((family.effect.name,)) for family in fit.families]
-        most = [FORGIVEN**2 * e for e in energies(squares(fit, self.linear.reduced),
-                                                       max(self.nothing - fit.misfit, 0.0), self._missed(fit))]
-        whole = float(left.reduced()[0, 0])
-        rest = whole if beside is None else beside.left
-        if beside is not None:
-            each, most = [*each, {beside.component}], [*most, UNKNOWN_FORGIVEN**2 * (whole - beside.misfit)]
-
-        def at(places: set[str], most: float) -> Liberty:
-            free = max(self.flying.courses.free(left, places) - (whole - rest), 0.0)
-            return Liberty(free, len(places), most, rest - free)
-
-        found = [at(*one) for one in zip(each, most, strict=True)]
-        all_of_them = set().union(*each)
-        if len(each) > 1 and len(all_of_them) <= FEW_PLACES:
-            found.append(at(all_of_them, sum(min(one.free, one.most) for one in found)))
-        return tuple(found)
+        missed = [max(left.get(names, np.inf) - fit.misfit, 0.0) for names in rest]
+        return AtLiberty(self.flying, self.linear, fit, self.nothing, missed)
 
     def nothing_at_all(self) -> int:
         """Index of no gap."""
@@ -266,7 +218,7 @@ class _Search:
                 gained = known.form.gained[k] + float(np.log(OTHER_FORM))
                 remainder = self.bent[i].left if i in self.bent else remainder
                 left = remainder.reduced()
-                left = given(left, *self._room(i, known, left), SHARES[k - 1])
+                left = given(left, *self._at_liberty(known.fit).room(Bent(self.points[i], remainder)), SHARES[k - 1])
                 fits = fit_unknown_left(left, self.flying.candidates)
                 fits = split(known.fit, known.form, fits, self.nothing, self.linear.raw)[1]
         fits = [u for u in fits if not self._named(u, known)]
@@ -280,7 +232,7 @@ class _Search:
         more = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
         prior = np.log(P_BESIDE / (1.0 - P_NONE)) + known.log_prior if known.effects else np.log(P_UNKNOWN)
         return own, [Hypothesis(known.fit, best, float(prior), known.log_evidence + gained + more,
-                                Form((0.0,), (best.left,), self._free(known.fit, remainder, best)))]
+                                Form((0.0,), (best.left,), self._at_liberty(known.fit).free(remainder, best)))]
 
     def _named(self, unknown: UnknownFit, beside: Hypothesis) -> bool:
         """Whether generic terms are another form of a single effect of the library; beside others, the like of it."""

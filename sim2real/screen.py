@@ -15,8 +15,9 @@ import numpy as np
 
 from icing_env.record import FloatArray
 from sim2real.corrections import corrected, inherited
+from sim2real.forgiveness import forgive
 from sim2real.form import Form
-from sim2real.hypotheses import Hypothesis, Posterior, forgive, normalised
+from sim2real.hypotheses import Hypothesis, Posterior, normalised
 from sim2real.points import Flying
 from sim2real.steps import FARTHEST, Places, Point
 

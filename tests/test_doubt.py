@@ -7,8 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim2real.candidates import bank
+from sim2real.forgiveness import ELSEWHERE, _leaking, elsewhere
 from sim2real.generic import UnknownFit
-from sim2real.hypotheses import DOUBT, ELSEWHERE, Hypothesis, _leaking, doubted, elsewhere, normalised
+from sim2real.hypotheses import DOUBT, Hypothesis, doubted, normalised
 from sim2real.sets import SetFit
 
 SOMETHING = UnknownFit("x_force", 0.0, (("1", 1.0, 0.1),), 0.0, {})

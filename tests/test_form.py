@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from icing_env import effects
 from sim2real.candidates import bank
+from sim2real.devices import within
 from sim2real.form import (
     ALIKE,
     DIRECTIONS,
@@ -25,7 +26,7 @@ from sim2real.form import (
 from sim2real.generic import UnknownFit, fit_unknown
 from sim2real.home_terms import gain, without
 from sim2real.home_terms import given as after_terms
-from sim2real.hypotheses import set_prior, within
+from sim2real.hypotheses import set_prior
 from sim2real.terms import BEYOND, GENERIC, unit_of
 
 TERMS = 6

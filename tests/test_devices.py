@@ -1,0 +1,67 @@
+"""Paths and flights say nothing of one another, and no member of a set explains more than the set would miss."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from icing_env import effects
+from sim2real.candidates import FEW, NODES, at_few_sizes, bank
+from sim2real.devices import apart, within
+from sim2real.forgiveness import _leaking, elsewhere
+from sim2real.form import energies
+from sim2real.generic import UnknownFit
+from sim2real.hypotheses import Hypothesis
+from sim2real.sets import SetFit
+
+WHOLE = bank()
+
+
+def one(*names: str) -> SetFit:
+    return SetFit(tuple(next(f for f in WHOLE.families if f.effect.name == name) for name in names))
+
+
+def test_only_actuators_and_the_spool_are_apart():
+    told = {name for name, effect in effects.LIBRARY.items() if name != "turbulence" and apart(effect)}
+    surfaces = {f"{s}_{what}" for s in ("elevator", "aileron", "rudder") for what in ("lag", "gearing")}
+    assert told == surfaces | {"elevator_offset", "elevator_rate_limit", "spool_lag"}
+
+
+@pytest.mark.parametrize(("first", "second", "place"), [("rudder_lag", "early_stall", "z_force"),
+                                                        ("early_stall", "rudder_lag", "rudder_path")])
+def test_what_a_path_leaves_is_no_second_gap_in_flight(first, second, place):
+    """Nor the other way round; within flight it may be."""
+    regained = 500.0
+    beside = UnknownFit(place, 0.0, (("1", 1.0, 0.1),), 0.0, {})
+    found = [Hypothesis(one(first), None, -5.0, 100.0, regained=regained),
+             Hypothesis(one(first, second), None, -10.0, 140.0, regained=regained),
+             Hypothesis(one(first), beside, -9.0, 140.0),
+             Hypothesis(one("wing_ice"), None, -5.0, 100.0, regained=regained),
+             Hypothesis(one("fin_ice", "wing_ice"), None, -10.0, 140.0)]  # fmt: skip
+    less = [before.log_posterior - after.log_posterior for before, after in zip(found, _leaking(found), strict=True)]
+    assert less == pytest.approx([0.0, 0.0, 0.0, 0.0, elsewhere(regained)])
+
+
+def test_a_device_is_what_two_faults_share():
+    assert within("elevator_gearing", ["elevator_lag"]) and not within("elevator_gearing", ["rudder_lag"])
+
+
+def test_a_member_that_a_set_would_not_miss_explains_nothing():
+    assert energies([400.0, 300.0], 500.0) == pytest.approx([400.0 * 5 / 7, 300.0 * 5 / 7])
+    assert energies([400.0, 300.0], 500.0, [float("inf"), 2.0]) == pytest.approx([400.0 * 5 / 7, 2.0])
+    assert energies([400.0], 500.0, [1.0]) == [500.0]  # one alone has nothing to be without
+
+
+def test_few_sizes_are_the_typical_ones():
+    few = at_few_sizes(WHOLE, ("wing_ice",))
+    assert not few.terms and few.size == 1 + len(few.nuisances) + sum(len(f.nodes) for f in few.families)
+    assert {f.effect.name for f in few.families} == {f.effect.name for f in WHOLE.families} - {"wing_ice"}
+    rows = [row for f in few.families for row in f.rows]
+    assert rows == list(range(1 + len(few.nuisances), few.size))
+    for family in few.families:
+        assert 1 <= len(family.nodes) <= FEW
+        p = family.parameter
+        assert p.typical == 0.0 or min(abs(size - p.typical) for size in family.nodes) < 0.1 * (p.high - p.low)
+    assert max(len(f.nodes) for f in WHOLE.families) == NODES
+    assert replace(few, families=()).linear == tuple(range(1, 1 + len(few.nuisances)))
