@@ -14,7 +14,7 @@ from scipy.linalg import block_diag
 
 from icing_env.record import FloatArray
 from sim2real.courses import Course, Courses, Remainder, in_time
-from sim2real.generic import UnknownFit
+from sim2real.generic import COURSE, UnknownFit
 from sim2real.side_by_side import each
 from sim2real.terms import BEYOND, GENERIC
 
@@ -78,7 +78,7 @@ def _fit(component: str, inner: FloatArray, onto: FloatArray, misfit: float) -> 
     heights = best**2 * along / (1.0 + best**2 * energy)
     luck = float(np.sum(best**2 * energy / (1.0 + best**2 * energy)))
     return UnknownFit(component, float(np.logaddexp.reduce(logs) - np.log(len(SIZES))),
-                      (("course", float(np.sqrt(np.mean(heights**2))), best),),
+                      ((COURSE, float(np.sqrt(np.mean(heights**2))), best),),
                       misfit - max(float(along @ heights) - luck, 0.0), {})
 
 

@@ -16,6 +16,7 @@ from icing_env import aircraft
 from icing_env.effects import Effect, Parameter
 from icing_env.types import DERIVATIVE_NAMES
 
+COMMON = {"1", "time", "airspeed", "alpha", "CT"}  # what any force or moment may be a function of
 COMPONENTS = {"CX": "x_force", "CY": "y_force", "CZ": "z_force", "Cl": "rolling_moment", "Cm": "pitching_moment",
               "Cn": "yawing_moment"}  # fmt: skip
 
@@ -35,6 +36,22 @@ def bends(effect: Effect) -> frozenset[tuple[str, str]]:
     pairs = [(COMPONENTS[name[:2]], name[3:].rstrip("2")) for name in changed if not name.endswith("_0")]
     powers = (2, 3) if len(pairs) == 1 else (1, 2, 3)
     return frozenset((component, "*".join([by] * power)) for component, by in pairs for power in powers)
+
+
+@cache
+def natural(effect: Effect, component: str, term: str) -> bool:
+    """Whether a generic term may belong to another form of an effect.
+
+    Where an effect changes derivatives alone, its form is a function of their regressors, of speed, flow and power; a
+    rudder's moment is no form of ice on a wing, though both yaw. Other effects may have any.
+    """
+    changed = changes(effect)
+    if component not in COMPONENTS.values() or not all(name[:2] in (*COMPONENTS, "CD") for name in changed):
+        return True
+    own = {name[3:].rstrip("2") for name in changed} | COMMON
+    if "alphadot" in own:  # in flight hardly another thing than a rate of pitch
+        own |= {"q"}
+    return all(factor in own for factor in term.split("*"))
 
 
 @cache

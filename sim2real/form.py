@@ -17,9 +17,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from icing_env import effects
+from icing_env.effects import Effect
 from icing_env.record import FloatArray
-from sim2real.bends import bends
-from sim2real.generic import UnknownFit
+from sim2real.bends import bends, natural
+from sim2real.generic import COURSE, UnknownFit
 from sim2real.sets import SetFit
 from sim2real.terms import Term
 
@@ -42,8 +43,9 @@ ALIKE = {
     "wind": ("x_force", "y_force", "z_force", "sensor:airspeed", "sensor:alpha", "sensor:beta",
              "sensor:altitude"),
 }
-# Where an effect may enter beside, in another form: a half wing that loses its roll loses lift and gains drag.
-ALSO = {"asymmetric_ice": ("x_force", "z_force")}
+# Where an effect may enter beside, in another form: a half wing that loses its roll loses lift and gains drag, and of
+# two that stall one goes first.
+ALSO = {"asymmetric_ice": ("x_force", "z_force"), "early_stall": ("x_force", "rolling_moment", "yawing_moment")}
 
 
 @dataclass(frozen=True)
@@ -125,9 +127,10 @@ def forgiven(left: float, explained: float, foreign: float = 0.0, places: int = 
 
 
 def own_terms(names: Iterable[str], terms: Sequence[Term]) -> list[Term]:
-    """Generic terms at the components where any of the effects enters."""
-    places = home(names)
-    return [term for term in terms if term.component in places]
+    """Generic terms at the components where any of the effects enters, of a kind that its form may have."""
+    places = [(_places(name), effects.LIBRARY[name]) for name in names]
+    return [term for term in terms
+            if any(term.component in own and natural(effect, term.component, term.name) for own, effect in places)]
 
 
 def home(names: Iterable[str]) -> set[str]:
@@ -188,7 +191,8 @@ def room(fit: SetFit, own: Sequence[float], bending: Sequence[float], terms: Seq
     out = np.zeros(len(terms))
     for family, square, energy, whole in zip(fit.families, own, most, bending, strict=True):
         energy = min(square, energy)
-        home = np.array([term.component in _places(family.effect.name) for term in terms])
+        home = np.array([term.component in _places(family.effect.name)
+                         and natural(family.effect, term.component, term.name) for term in terms])
         if energy > LEAST**2 and home.any():
             out += home * energy / np.count_nonzero(home)
         bent = np.array([(term.component, term.name) in bends(family.effect) for term in terms])
@@ -242,9 +246,15 @@ def is_own(fit: SetFit, unknown: UnknownFit, nothing: float, raw: FloatArray) ->
     """
     taken, explained = fit.misfit - unknown.misfit, nothing - fit.misfit
     most = max(shares(len(fit.families))) ** 2 * explained
-    if explained <= LEAST**2 or not at_home(unknown.component, fit.effects):
+    if explained <= LEAST**2 or not any(_may_be(family.effect, unknown) for family in fit.families):
         return False
     return taken <= most or alike(fit, unknown, raw) > SHAPE or _bent(fit, unknown)
+
+
+def _may_be(effect: Effect, unknown: UnknownFit) -> bool:
+    """Whether generic terms are at an effect's home, and of a kind that its form may have."""
+    return at_home(unknown.component, (effect.name,)) and all(
+        name == COURSE or natural(effect, unknown.component, name) for name, _, _ in unknown.terms)
 
 
 def _bent(fit: SetFit, unknown: UnknownFit) -> bool:

@@ -21,6 +21,7 @@ from sim2real.terms import Term, in_what_is_left
 SCALES = (0.5, 1.0, 2.0)  # sizes of generic terms, in their own unit (assumed)
 IN_STEP = 0.03  # of the unit of a channel's lag: 3 ms, by which channels are out of step for no reason (assumed)
 FEW = 6  # terms at most that are chosen from a component's one by one
+COURSE = "course"  # name of a free course of time among terms
 STEP = 1e-3  # of an effect's range, for the slope of its signature
 
 

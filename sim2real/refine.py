@@ -67,7 +67,7 @@ def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior:
     search = _Search(flying, start, posterior, places)
     search.fly([search.nothing_at_all(), *(search.found.index(h) for h in leading(posterior))])
     search.fly(search.companions())
-    while len(search.points) < MOST and (following := search.following()) is not None:
+    while (following := search.following()) is not None:
         search.fly([following])
     return search.posterior()
 
@@ -104,9 +104,12 @@ class _Search:
     def following(self) -> int | None:
         """What to fly next: of the best set, unless that was flown, else what is left of it without one member.
 
-        A single effect that explains a good part goes first: what flying it corrects, all its sets inherit.
+        A single effect that explains a good part goes first: what flying it corrects, all its sets inherit. Once MOST
+        were flown, only what is left of the best of them.
         """
         best, bare = self.best(), self.before[self.nothing_at_all()].log_posterior
+        if len(self.points) >= MOST:
+            best = max(self.points, key=lambda i: self.found[i].log_posterior)
         if best in self.points:
             return next((i for i in self._less(best) if i not in self.points), None)
         least = PART * (self.found[best].log_posterior - bare)
