@@ -43,12 +43,16 @@ def natural(effect: Effect, component: str, term: str) -> bool:
     """Whether a generic term may belong to another form of an effect.
 
     Where an effect changes derivatives alone, its form is a function of their regressors, of speed, flow and power; a
-    rudder's moment is no form of ice on a wing, though both yaw. Other effects may have any.
+    rudder's moment is no form of ice on a wing, though both yaw. A constant is what is left of any function, so that
+    an effect that changes nothing else may have any form, and so may all others.
     """
     changed = changes(effect)
     if component not in COMPONENTS.values() or not all(name[:2] in (*COMPONENTS, "CD") for name in changed):
         return True
-    own = {name[3:].rstrip("2") for name in changed} | COMMON
+    own = {name[3:].rstrip("2") for name in changed}
+    if own == {"0"}:
+        return True
+    own |= COMMON
     if "alphadot" in own:  # in flight hardly another thing than a rate of pitch
         own |= {"q"}
     return all(factor in own for factor in term.split("*"))

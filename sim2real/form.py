@@ -31,7 +31,7 @@ SHARES = (0.15, 0.4, 0.8)
 # not enter would be a reason (assumed).
 FORGIVEN, LEAK = 0.3, 0.015
 UNKNOWN_FORGIVEN = 1.0  # the same of what generic terms explain where something unknown is (assumed)
-DIRECTIONS = 10.0  # in which such a remainder lies for every component at home (assumed)
+DIRECTIONS = 20.0  # in which such a remainder lies for every component at home (assumed)
 LUCK = 15.0  # whitened square that a free course at one component takes by luck (deviation of 120 knots' chance)
 MOSTLY, SHAPE = 0.6, 0.8  # of what generic terms explain, of their shape: an effect that is more of it is what they are
 WORTH = 20.0  # log evidence that terms have to add, to be flown

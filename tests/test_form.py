@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from icing_env import effects
+from sim2real.bends import natural
 from sim2real.candidates import bank
 from sim2real.devices import within
 from sim2real.form import (
@@ -166,3 +167,13 @@ def test_one_term_is_found_alone_where_one_is_enough() -> None:
     (found,) = [u for u in fit_unknown(gram, candidates) if u.component == "pitching_moment"]
     assert [name for name, _, _ in found.terms] == [at[2].name]
     assert found.log_evidence > 10.0
+
+
+def test_a_form_is_a_function_of_what_its_effect_is_one_of():
+    """Ice on one wing yaws with alpha and thrust, never with a rudder; a constant may be anything."""
+    ice, trim, pitch = (effects.LIBRARY[name] for name in ("asymmetric_ice", "pitch_trim", "pitch_damping"))
+    assert not natural(ice, "yawing_moment", "rudder")
+    assert natural(ice, "rolling_moment", "alpha*alpha")
+    assert natural(trim, "pitching_moment", "alpha*elevator")
+    assert natural(pitch, "pitching_moment", "alpha*q")
+    assert not natural(pitch, "pitching_moment", "elevator")
