@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from sim2real.candidates import bank
 from sim2real.forgiveness import ELSEWHERE, _leaking, elsewhere
 from sim2real.generic import UnknownFit
-from sim2real.hypotheses import DOUBT, Hypothesis, doubted, normalised
+from sim2real.hypotheses import DOUBT, MOST_DOUBT, Hypothesis, doubt, doubted, normalised
 from sim2real.sets import SetFit
 
 SOMETHING = UnknownFit("x_force", 0.0, (("1", 1.0, 0.1),), 0.0, {})
@@ -37,6 +37,19 @@ def test_doubt_about_a_gap_is_for_other_explanations_of_it():
     assert after[0].probability < 1.0 - 0.4 * DOUBT
     assert after[1].probability > 0.25 * DOUBT
     assert after[-1].probability < 0.1 * DOUBT
+
+
+@given(st.floats(-10.0, 1e6), st.floats(0.0, 1e5))
+def test_doubt_grows_as_the_library_s_own_form_fails(regained, more):
+    assert DOUBT <= doubt(regained) <= doubt(regained + more) <= MOST_DOUBT
+
+
+def test_what_another_form_explains_is_doubted_more():
+    exact, bent = (doubted(normalised([Hypothesis(SetFit(), None, -1.0, 0.0),
+                                       Hypothesis(SetFit(), SOMETHING, -2.0, 300.0 - r, regained=r),
+                                       Hypothesis(SetFit(), SOMETHING, -3.0, 100.0)], 0.0)) for r in (0.0, 200.0))
+    assert exact[0].probability == pytest.approx(1.0 - doubt(0.0), abs=0.01)
+    assert bent[0].probability == pytest.approx(1.0 - doubt(200.0), abs=0.02)
 
 
 def test_no_gap_is_not_doubted():
