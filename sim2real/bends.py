@@ -31,11 +31,28 @@ def changes(effect: Effect) -> frozenset[str]:
 
 @cache
 def bends(effect: Effect) -> frozenset[tuple[str, str]]:
-    """Generic terms (component, name) that are powers of the regressors of the derivatives that an effect changes."""
+    """Generic terms (component, name) that are powers of the regressors of the derivatives that an effect changes.
+
+    Or of the reading that it scales: no instrument's calibration is quite a line.
+    """
+    if channel := scales(effect):
+        return frozenset({(f"sensor:{channel}", f"{channel}*{channel}")})
     changed = [name for name in DERIVATIVE_NAMES if name in changes(effect)]
     pairs = [(COMPONENTS[name[:2]], name[3:].rstrip("2")) for name in changed if not name.endswith("_0")]
     powers = (2, 3) if len(pairs) == 1 else (1, 2, 3)
     return frozenset((component, "*".join([by] * power)) for component, by in pairs for power in powers)
+
+
+@cache
+def scales(effect: Effect) -> str:
+    """The channel whose reading an effect scales, where it does nothing else; empty if there is none."""
+    return _alone(effect, "scale_")
+
+
+def _alone(effect: Effect, kind: str) -> str:
+    """The channel of the one number of a kind that an effect changes, if it changes no other; else empty."""
+    changed = changes(effect)
+    return next((name.removeprefix(kind) for name in changed if name.startswith(kind) and len(changed) == 1), "")
 
 
 @cache
@@ -44,9 +61,14 @@ def natural(effect: Effect, component: str, term: str) -> bool:
 
     Where an effect changes derivatives alone, its form is a function of their regressors, of speed, flow and power; a
     rudder's moment is no form of ice on a wing, though both yaw. A constant is what is left of any function, so that
-    an effect that changes nothing else may have any form, and so may all others.
+    an effect that changes nothing else may have any form. An instrument's scale is a function of its own reading, its
+    bias of time at most; an error of airspeed with the angle of attack is neither. Other effects may have any form.
     """
     changed = changes(effect)
+    if (channel := scales(effect)) and component == f"sensor:{channel}":
+        return set(term.split("*")) <= {"1", "time", channel}
+    if (channel := _alone(effect, "bias_")) and component == f"sensor:{channel}":
+        return term in ("1", "time")
     if component not in COMPONENTS.values() or not all(name[:2] in (*COMPONENTS, "CD") for name in changed):
         return True
     own = {name[3:].rstrip("2") for name in changed}

@@ -32,12 +32,17 @@ SUSPECTS = 2  # effects flown beside it because a nuisance went as far as it may
 
 
 def leading(posterior: Posterior) -> list[Hypothesis]:
-    """Explanations to fly again where there is a gap at all: the probable ones, and the best single effect."""
+    """Explanations to fly again where there is a gap at all: the probable ones, and the best single effects.
+
+    One with what may be forgiven it, one as the library has it: of an enormous gap almost all would be forgiven to any.
+    """
     if posterior.none > CERTAIN:
         return []
     known = sorted((h for h in posterior.hypotheses if h.unknown is None), key=lambda h: -h.log_posterior)
     chosen = [h for h in known if h.probability > LIKELY][:LEADING]
-    chosen += [h for h in known if len(h.effects) == 1 and h not in chosen][:1]
+    alone = [h for h in known if len(h.effects) == 1]
+    as_it_is = sorted(alone, key=lambda h: -h.log_evidence)
+    chosen = list(dict.fromkeys([*chosen, *[h for h in alone if h not in chosen][:1], *as_it_is[:1]]))
     return chosen if any(h.effects for h in chosen) else []
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from icing_env import effects
 from icing_env.effects import Effect
 from icing_env.record import FloatArray
-from sim2real.bends import bends, natural
+from sim2real.bends import bends, natural, scales
 from sim2real.generic import COURSE, UnknownFit
 from sim2real.sets import SetFit
 from sim2real.terms import Term
@@ -229,6 +229,17 @@ def alike(fit: SetFit, unknown: UnknownFit, raw: FloatArray) -> float:
             one = {row: w for row, w in (fit.weights or {}).items() if row in family.rows}
             found.append(_cosine(one, unknown.weights, raw))
     return max(found)
+
+
+def calibration(name: str, unknown: UnknownFit, raw: FloatArray) -> bool:
+    """Whether generic terms are mostly a function of the one reading that an effect scales."""
+    effect = effects.LIBRARY[name]
+    if not (channel := scales(effect)) or unknown.component != f"sensor:{channel}":
+        return False
+    names = [term for term, _, _ in unknown.terms]
+    own = {row: w for term, (row, w) in zip(names, unknown.weights.items(), strict=False)
+           if natural(effect, unknown.component, term)}  # fmt: skip
+    return bool(own) and _cosine(own, unknown.weights, raw) > SHAPE
 
 
 def _cosine(one: dict[int, float], other: dict[int, float], raw: FloatArray) -> float:

@@ -11,7 +11,7 @@ from scipy.special import logsumexp, softmax
 
 from icing_env.record import FloatArray
 from sim2real.devices import within
-from sim2real.form import LEAST, MOSTLY, SHAPE, Form, alike, at_home
+from sim2real.form import LEAST, MOSTLY, SHAPE, Form, alike, at_home, calibration
 from sim2real.generic import UnknownFit
 from sim2real.sets import SetFit
 from sim2real.singles import EffectFit
@@ -165,7 +165,8 @@ def is_home(h: Hypothesis, unknown: UnknownFit, told: float, explained: float, r
     """
     if len(h.effects) != 1 or h.unknown is not None or not at_home(unknown.component, h.effects):
         return False
-    return told > 0.0 and explained > LEAST**2 and (explained > MOSTLY * told or alike(h.fit, unknown, raw) > SHAPE)
+    return told > 0.0 and explained > LEAST**2 and (
+        explained > MOSTLY * told or alike(h.fit, unknown, raw) > SHAPE or calibration(h.effects[0], unknown, raw))
 
 
 def normalised(found: Sequence[Hypothesis], least: float = KEPT) -> tuple[Hypothesis, ...]:

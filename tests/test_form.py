@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from icing_env import effects
-from sim2real.bends import natural
+from sim2real.bends import bends, natural
 from sim2real.candidates import bank
 from sim2real.devices import within
 from sim2real.form import (
@@ -20,6 +20,7 @@ from sim2real.form import (
     SHARES,
     Form,
     Liberty,
+    calibration,
     forgiven,
     own_terms,
     with_terms,
@@ -177,3 +178,21 @@ def test_a_form_is_a_function_of_what_its_effect_is_one_of():
     assert natural(trim, "pitching_moment", "alpha*elevator")
     assert natural(pitch, "pitching_moment", "alpha*q")
     assert not natural(pitch, "pitching_moment", "elevator")
+
+
+def test_a_scale_is_a_function_of_its_own_reading_and_a_bias_of_none():
+    speed, gyro, vane = (effects.LIBRARY[name] for name in ("airspeed_scale", "pitch_gyro_bias", "alpha_scale"))
+    assert natural(speed, "sensor:airspeed", "airspeed*airspeed")
+    assert not natural(speed, "sensor:airspeed", "alpha")
+    assert natural(gyro, "sensor:q", "time")
+    assert not natural(gyro, "sensor:q", "az")
+    assert bends(vane) == {("sensor:alpha", "alpha*alpha")}
+    rows = {term.name: term.row for term in bank().terms if term.component == "sensor:alpha"}
+    raw = np.eye(max(rows.values()) + 1)
+    bent, other = (UnknownFit("sensor:alpha", 0.0, tuple((name, w, 0.1) for name, w in terms), 0.0,
+                              {rows[name]: w for name, w in terms})
+                   for terms in ((("alpha*alpha", 1.0), ("q", 0.2)), (("alpha*alpha", 0.2), ("q", 1.0))))
+    assert calibration("alpha_scale", bent, raw)
+    assert not calibration("alpha_scale", other, raw)
+    assert not calibration("alpha_bias", bent, raw)
+    assert not calibration("static_stability", bent, raw)
