@@ -19,7 +19,7 @@ from icing_env.record import FloatArray
 from sim2real.any_course import with_courses
 from sim2real.candidates import NUISANCE_STEP, Bank
 from sim2real.forgiveness import forgive
-from sim2real.form import Form, may_bend, own_terms, room, shares, split, squares, with_terms
+from sim2real.form import Form, may_bend, own_terms, room, shares, squares, with_terms
 from sim2real.generic import UnknownFit, beside, fit_unknown
 from sim2real.home_terms import gain, without
 from sim2real.hypotheses import (
@@ -34,6 +34,7 @@ from sim2real.hypotheses import (
     normalised,
     set_prior,
 )
+from sim2real.likeness import split
 from sim2real.sets import INTEGRATED, SetFit, firm, grow, integrate, pairs, sizes_tried
 from sim2real.singles import EffectFit, ambiguity, fit_family
 from sim2real.sizes import flown_weights, in_powers

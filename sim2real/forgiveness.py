@@ -10,9 +10,10 @@ import numpy as np
 
 from icing_env import effects
 from sim2real.devices import apart, within
-from sim2real.form import MOSTLY, OTHER_FORM, SHARES, forgiven
+from sim2real.form import OTHER_FORM, SHARES, forgiven
 from sim2real.generic import UnknownFit
 from sim2real.hypotheses import Hypothesis
+from sim2real.likeness import MOSTLY
 from sim2real.paths import PATHS
 
 ELSEWHERE = 10.0  # log evidence that another form leaves elsewhere: 4 to 13 in three answers of a sealed set

@@ -17,10 +17,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from icing_env import effects
-from icing_env.effects import Effect
 from icing_env.record import FloatArray
-from sim2real.bends import bends, natural, scales
-from sim2real.generic import COURSE, UnknownFit
+from sim2real.bends import bends, natural
+from sim2real.generic import UnknownFit
 from sim2real.sets import SetFit
 from sim2real.terms import Term
 
@@ -33,7 +32,6 @@ FORGIVEN, LEAK = 0.3, 0.015
 UNKNOWN_FORGIVEN = 1.0  # the same of what generic terms explain where something unknown is (assumed)
 DIRECTIONS = 20.0  # in which such a remainder lies for every component at home (assumed)
 LUCK = 15.0  # whitened square that a free course at one component takes by luck (deviation of 120 knots' chance)
-MOSTLY, SHAPE = 0.6, 0.8  # of what generic terms explain, of their shape: an effect that is more of it is what they are
 WORTH = 20.0  # log evidence that terms have to add, to be flown
 LEAST = 3.0  # whitened size of a set's signature below which its form does not matter
 # Generic terms by which an effect that enters at a component may differ from the library's.
@@ -212,78 +210,6 @@ def may_bend(own: Sequence[float], whole: Sequence[float]) -> list[float]:
 def shares(members: int) -> tuple[float, ...]:
     """rho that a set may have: several effects with large remainders at home could be anything."""
     return SHARES if members == 1 else SHARES[:-1]
-
-
-def alike(fit: SetFit, unknown: UnknownFit, raw: FloatArray) -> float:
-    """Squared cosine between what generic terms make of the records and an effect of a set that enters there.
-
-    Nuisances stay where they are: a moment that saturates with sideslip is first of all a moment of sideslip, even if
-    the linear part of it is within the model's own uncertainty.
-
-    Args:
-        raw: inner products of all rows of the bank.
-    """
-    found = [0.0]
-    for family in fit.families:
-        if at_home(unknown.component, (family.effect.name,)):
-            one = {row: w for row, w in (fit.weights or {}).items() if row in family.rows}
-            found.append(_cosine(one, unknown.weights, raw))
-    return max(found)
-
-
-def calibration(name: str, unknown: UnknownFit, raw: FloatArray) -> bool:
-    """Whether generic terms are mostly a function of the one reading that an effect scales."""
-    effect = effects.LIBRARY[name]
-    if not (channel := scales(effect)) or unknown.component != f"sensor:{channel}":
-        return False
-    names = [term for term, _, _ in unknown.terms]
-    own = {row: w for term, (row, w) in zip(names, unknown.weights.items(), strict=False)
-           if natural(effect, unknown.component, term)}  # fmt: skip
-    return bool(own) and _cosine(own, unknown.weights, raw) > SHAPE
-
-
-def _cosine(one: dict[int, float], other: dict[int, float], raw: FloatArray) -> float:
-    rows = [*one, *other]
-    a, b = np.zeros(len(rows)), np.array([*([0.0] * len(one)), *other.values()])
-    a[: len(one)] = list(one.values())
-    inner = raw[np.ix_(rows, rows)]
-    return float((a @ inner @ b) ** 2 / max((a @ inner @ a) * (b @ inner @ b), 1e-30))
-
-
-def is_own(fit: SetFit, unknown: UnknownFit, nothing: float, raw: FloatArray) -> bool:
-    """Whether what generic terms take beside a set is another form of its effects, by place and by size or shape.
-
-    What these records do not show by itself has no other form that they show.
-    """
-    taken, explained = fit.misfit - unknown.misfit, nothing - fit.misfit
-    most = max(shares(len(fit.families))) ** 2 * explained
-    if explained <= LEAST**2 or not any(_may_be(family.effect, unknown) for family in fit.families):
-        return False
-    return taken <= most or alike(fit, unknown, raw) > SHAPE or _bent(fit, unknown)
-
-
-def _may_be(effect: Effect, unknown: UnknownFit) -> bool:
-    """Whether generic terms are at an effect's home, and of a kind that its form may have."""
-    return at_home(unknown.component, (effect.name,)) and all(
-        name == COURSE or natural(effect, unknown.component, name) for name, _, _ in unknown.terms)
-
-
-def _bent(fit: SetFit, unknown: UnknownFit) -> bool:
-    """Whether generic terms are powers of the regressors of derivatives that a set changes, and nothing else."""
-    return all(any((unknown.component, name) in bends(family.effect) for family in fit.families)
-               for name, _, _ in unknown.terms)  # fmt: skip
-
-
-def split(fit: SetFit, form: Form | None, fits: Sequence[UnknownFit], nothing: float,
-          raw: FloatArray) -> tuple[UnknownFit | None, list[UnknownFit]]:
-    """The best of the generic fits beside a set that is its own form, and the fits that are not.
-
-    What terms at home do beside a set, and its form does as well, is that form, told in fewer terms.
-    """
-    as_well = -np.inf if form is None else float(np.logaddexp.reduce(form.gained))
-    own = [u for u in fits if is_own(fit, u, nothing, raw)
-           or (at_home(u.component, fit.effects) and WORTH < u.log_evidence <= as_well)]  # fmt: skip
-    return max(own, key=lambda u: u.log_evidence, default=None), [u for u in fits if u not in own]
 
 
 def with_terms(form: Form | None, own: UnknownFit | None) -> Form | None:

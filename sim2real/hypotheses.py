@@ -11,8 +11,9 @@ from scipy.special import logsumexp, softmax
 
 from icing_env.record import FloatArray
 from sim2real.devices import within
-from sim2real.form import LEAST, MOSTLY, SHAPE, Form, alike, at_home, calibration
+from sim2real.form import LEAST, Form, at_home
 from sim2real.generic import UnknownFit
+from sim2real.likeness import MOSTLY, SHAPE, alike, calibration
 from sim2real.sets import SetFit
 from sim2real.singles import EffectFit
 

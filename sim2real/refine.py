@@ -20,18 +20,7 @@ from sim2real.companions import companions, leading, together, without
 from sim2real.corrections import corrected, inherited, lost
 from sim2real.courses import Remainder
 from sim2real.forgiveness import forgive
-from sim2real.form import (
-    OTHER_FORM,
-    SHAPE,
-    SHARES,
-    WORTH,
-    Form,
-    alike,
-    home,
-    shares,
-    split,
-    with_terms,
-)
+from sim2real.form import OTHER_FORM, SHARES, WORTH, Form, home, shares, with_terms
 from sim2real.generic import UnknownFit, fit_unknown_left
 from sim2real.home_terms import given
 from sim2real.hypotheses import (
@@ -45,6 +34,7 @@ from sim2real.hypotheses import (
     set_prior,
 )
 from sim2real.liberty import AtLiberty
+from sim2real.likeness import SHAPE, alike, split
 from sim2real.other_form import Bent, flown_unknown, other_form
 from sim2real.points import Flying
 from sim2real.sets import SetFit

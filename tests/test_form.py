@@ -20,7 +20,6 @@ from sim2real.form import (
     SHARES,
     Form,
     Liberty,
-    calibration,
     forgiven,
     own_terms,
     with_terms,
@@ -29,6 +28,7 @@ from sim2real.generic import UnknownFit, fit_unknown
 from sim2real.home_terms import gain, without
 from sim2real.home_terms import given as after_terms
 from sim2real.hypotheses import set_prior
+from sim2real.likeness import calibration
 from sim2real.terms import BEYOND, GENERIC, unit_of
 
 TERMS = 6
