@@ -14,6 +14,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
+from icing_env.parameters import as_bytes
 from icing_env.record import FloatArray
 from icing_env.simulate import Fleet
 from sim2real.along import along
@@ -26,9 +27,8 @@ START = 0.25  # s whose mean a row starts from
 
 
 def end_to_end(rows: Sequence[NDArray]) -> NDArray:
-    """Structured arrays of one kind as one; numpy would compare their hundreds of fields one by one."""
-    kind = rows[0].dtype
-    return np.concatenate([own.view(f"V{kind.itemsize}") for own in rows]).view(kind)
+    """Structured arrays of one kind as one."""
+    return np.concatenate([as_bytes(own) for own in rows]).view(rows[0].dtype)
 
 
 class Abreast:

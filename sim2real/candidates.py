@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from icing_env import effects
 from icing_env.effects import Effect, Parameter
+from icing_env.parameters import as_bytes, copied
 from icing_env.record import FloatArray
 from icing_env.types import DERIVATIVE_NAMES
 from sim2real.channels import LATERAL, SURFACES
@@ -58,7 +59,7 @@ class Nuisance:
 
 def shifted(parameters: NDArray, directions: tuple[Nuisance, ...], sizes: FloatArray, power_from: str) -> NDArray:
     """One PARAMETERS row moved in every nuisance direction by `sizes` standard deviations."""
-    out = parameters.copy()
+    out = copied(parameters)
     for nuisance, size in zip(directions, sizes, strict=True):
         nuisance.apply(out, 0, power_from, float(size))
     return out
@@ -178,9 +179,9 @@ def parameter_rows(flight: Reconstruction, candidates: Bank) -> NDArray:
     for j, nuisance in enumerate(candidates.nuisances, start=1):
         nuisance.apply(rows, j, flight.power_from)
     for family in candidates.families:
-        chosen = list(family.rows)
-        rows[chosen] = effects.with_effects(
-            rows[chosen], {family.effect.name: {family.parameter.name: np.array(family.nodes)}})
+        own = slice(family.rows[0], family.rows[-1] + 1)
+        as_bytes(rows)[own] = as_bytes(effects.with_effects(
+            rows[own], {family.effect.name: {family.parameter.name: np.array(family.nodes)}}))
     return rows
 
 

@@ -100,7 +100,7 @@ def flown(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain:
           keep: Sequence[int] = (), linear: Responses = NONE) -> Evidence:
     """The same but for the paths, which do not care how the aircraft flies."""
     moved, renamed = to_fly(flight, rows, pushed)
-    left = with_spare(flight, rows[moved], gain.K, renamed)
+    left = with_spare(flight, np.take(rows, moved), gain.K, renamed)
     return told(flight, left, moved, len(rows), gain, factor, keep, linear)
 
 
@@ -150,8 +150,9 @@ def told(flight: Reconstruction, left: FloatArray, moved: Sequence[int], count: 
 
 def flown_rows(flight: Reconstruction, rows: FloatArray, pushed: set[int]) -> list[int]:
     """Row 0 and those that differ from it once surfaces and powers follow the record."""
-    kept = held(rows, flight.dt)
-    return [j for j in range(len(rows)) if j == 0 or j in pushed or kept[j].tobytes() != kept[0].tobytes()]
+    kept = held(rows, flight.dt).view(np.uint8).reshape(len(rows), -1)
+    moved = np.any(kept != kept[0], axis=1)
+    return [j for j in range(len(rows)) if j == 0 or j in pushed or moved[j]]
 
 
 def choose_gain(flight: Reconstruction, options: list[Gain], pushed: Sequence[Push] = ()) -> Gain:

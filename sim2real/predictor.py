@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icing_env.frames import direction_cosines, to_body
+from icing_env.parameters import copied
 from icing_env.record import FloatArray
 from icing_env.simulate import Fleet
 from icing_env.types import STATE
@@ -150,7 +151,7 @@ def _listed(items: list[tuple[int, int, FloatArray]]) -> Listed:
 
 def held(parameters: NDArray, dt: float) -> NDArray:
     """PARAMETERS for a plant whose surfaces and powers follow a record: no noise, no limits, gusts as states."""
-    out = parameters.copy()
+    out = copied(parameters)
     for name in out.dtype.names or ():
         if name.startswith("noise_"):
             out[name] = 0.0

@@ -67,6 +67,7 @@ from icing_env.effects import (
 )
 from icing_env.effects.effect import Effect, Parameter
 from icing_env.errors import InputError, nearest
+from icing_env.parameters import copied
 
 LIBRARY: dict[str, Effect] = {
     module.EFFECT.name: module.EFFECT
@@ -152,7 +153,7 @@ def with_effects(parameters: NDArray, effects: Mapping[str, Mapping[str, float |
     Raises:
         InputError: unknown effect or parameter, a value that is no finite number, or not one per aircraft.
     """
-    out = parameters.copy()
+    out = copied(parameters)
     for name, values in effects.items():
         effect = get(name)
         valid = [p.name for p in effect.parameters]
