@@ -140,7 +140,7 @@ class _Search:
     def _form(self, i: int, h: Hypothesis) -> Form:
         """Another form of a flown set, itself flown where it takes much."""
         flown, at_liberty = Bent(self.points[i], self.left[i]), self._at_liberty(h.fit)
-        form, bent = other_form(self.flying, h.fit, flown, *at_liberty.room(flown), shares(len(h.effects)))
+        form, bent = other_form(self.flying, h.fit, flown, *at_liberty.room(flown), shares(h.effects))
         form = replace(form, free=at_liberty.free(self.left[i]))
         if bent is None:
             return form
@@ -150,7 +150,8 @@ class _Search:
     def _at_liberty(self, fit: SetFit) -> AtLiberty:
         left = {h.effects: h.fit.misfit for h in self.found if h.unknown is None}
         rest = [tuple(sorted(name for name in fit.effects if name != own)) for own in fit.effects]
-        missed = [max(left.get(names, np.inf) - fit.misfit, 0.0) for names in rest]
+        less = [min(left.get(some, np.inf) for some in (names, *((name,) for name in names))) for names in rest]
+        missed = [max(more - fit.misfit, 0.0) for more in less]
         return AtLiberty(self.flying, self.linear, fit, self.nothing, missed)
 
     def nothing_at_all(self) -> int:
@@ -197,15 +198,20 @@ class _Search:
         self.added.add(len(self.found) - 1)
         return len(self.found) - 1
 
-    def _beside(self, i: int) -> tuple[UnknownFit | None, list[Hypothesis]]:
-        """Terms of a flown set's form, and something unknown beside it (alone if it is empty), its own form allowed."""
+    def _own(self, i: int) -> tuple[UnknownFit | None, list[UnknownFit]]:
+        """Generic terms beside a flown set that are a form of it, and those that are not."""
         known = self.found[i]
-        remainder, gained, own = self.left[i], 0.0, None
-        fits = self.generic[i]
+        if not known.effects or known.form is None:
+            return None, self.generic[i]
+        return split(known.fit, known.form, self.generic[i], self.nothing, self.linear.raw)
+
+    def _beside(self, i: int) -> list[Hypothesis]:
+        """Something unknown beside a flown set (alone if it is empty), its own form allowed."""
+        known, fits = self.found[i], self._own(i)[1]
+        remainder, gained = self.left[i], 0.0
+        if len(known.effects) > 1:  # a third cause: two effects of no account would pay for its terms
+            return []
         if known.effects and known.form is not None:
-            own, fits = split(known.fit, known.form, fits, self.nothing, self.linear.raw)
-            if len(known.effects) > 1:  # a third cause: two effects of no account would pay for its terms
-                return own, []
             ways = [known.form.way(k, self.nothing, self._least(), self._bare()) for k in range(len(known.form.gained))]
             if 0 < (k := int(np.argmax(ways))) <= len(SHARES):
                 gained = known.form.gained[k] + float(np.log(OTHER_FORM))
@@ -216,7 +222,7 @@ class _Search:
                 fits = split(known.fit, known.form, fits, self.nothing, self.linear.raw)[1]
         fits = [u for u in fits if not self._named(u, known)]
         if not fits:
-            return own, []
+            return []
         best = max(fits, key=lambda u: u.log_evidence)
         if not known.effects and best.weights and best.log_evidence > WORTH:
             flown = flown_unknown(self.flying, known.fit, Bent(self.points[i], self.left[i]), best)
@@ -224,8 +230,8 @@ class _Search:
             best = max(fits, key=lambda u: u.log_evidence)
         more = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
         prior = np.log(P_BESIDE / (1.0 - P_NONE)) + known.log_prior if known.effects else np.log(P_UNKNOWN)
-        return own, [Hypothesis(known.fit, best, float(prior), known.log_evidence + gained + more,
-                                Form((0.0,), (best.left,), self._at_liberty(known.fit).free(remainder, best)))]
+        return [Hypothesis(known.fit, best, float(prior), known.log_evidence + gained + more,
+                           Form((0.0,), (best.left,), self._at_liberty(known.fit).free(remainder, best)))]
 
     def _named(self, unknown: UnknownFit, beside: Hypothesis) -> bool:
         """Whether generic terms are another form of a single effect of the library; beside others, the like of it."""
@@ -245,10 +251,10 @@ class _Search:
         """
         ranked, others = self._ranked(), list[Hypothesis]()
         found = list(self.found)
+        for i in ranked:
+            found[i] = replace(found[i], form=with_terms(found[i].form, self._own(i)[0]))
         for i in dict.fromkeys([self.nothing_at_all(), ranked[0], *self._ranked(1)[:1]]):
-            own, beside = self._beside(i)
-            found[i] = replace(found[i], form=with_terms(found[i].form, own))
-            others += beside
+            others += self._beside(i)
         bound = found[ranked[0]].log_posterior
         chosen = [i for i, h in enumerate(found) if i in self.points or (h.unknown is None and h.log_posterior < bound)]
         flown, kept = [k for k, i in enumerate(chosen) if i in self.points], [found[i] for i in chosen] + others
