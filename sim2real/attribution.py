@@ -221,7 +221,7 @@ def _form(reduced: FloatArray, raw: FloatArray, bank: Bank, fit: SetFit) -> Form
     own = squares(fit, reduced)
     square = room(fit, own, may_bend(own, squares(fit, raw)), terms, kept, float(reduced[0, 0]))
     return gain(*without(together, first), square, fit.misfit,
-                shares(len(fit.families)), [term.component for term in terms])
+                shares(fit.effects), [term.component for term in terms])
 
 
 def _with_unknown(reduced: FloatArray, raw: FloatArray, bank: Bank, known: Hypothesis,

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from icing_env.record import FloatArray
-from sim2real.form import Form, shares
+from sim2real.form import SHARES, Form
 from sim2real.hypotheses import Hypothesis, Posterior
 from sim2real.sets import Modes, SetFit, integrate
 from sim2real.sizes import in_powers
@@ -48,7 +48,7 @@ def _moved(form: Form, now: Hypothesis, then: Hypothesis) -> Form:
     gained, left = list(form.gained), [left + more for left in form.left]
     if one is None or other is None:
         return replace(form, left=tuple(left))
-    for k in range(min(len(shares(2)) + 1, *(len(f.gained) for f in (form, one, other)))):
+    for k in range(min(len(SHARES), *(len(f.gained) for f in (form, one, other)))):
         gained[k] += one.gained[k] - other.gained[k]
         left[k] = form.left[k] + one.left[k] - other.left[k]
     more = form.left[0] - other.left[0]

@@ -22,6 +22,12 @@ def apart(effect: Effect) -> bool:
     return held(row, STEP).tobytes() == held(plain(), STEP).tobytes()
 
 
+def together(names: Sequence[str]) -> int:
+    """How many members of a set tell of one another, at most: those in flight, or those on one path."""
+    places = [effects.LIBRARY[name].enters_at[0] if apart(effects.LIBRARY[name]) else "" for name in names]
+    return max((places.count(place) for place in places), default=1)
+
+
 def within(name: str, others: Sequence[str]) -> bool:
     """Whether an effect enters at one device alone (an actuator, an engine, an instrument) where another one does.
 

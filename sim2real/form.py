@@ -19,6 +19,7 @@ import numpy as np
 from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.bends import bends, natural
+from sim2real.devices import together
 from sim2real.generic import UnknownFit
 from sim2real.sets import SetFit
 from sim2real.terms import Term
@@ -207,9 +208,12 @@ def may_bend(own: Sequence[float], whole: Sequence[float]) -> list[float]:
     return [square if beyond > LEAST**2 else 0.0 for beyond, square in zip(own, whole, strict=True)]
 
 
-def shares(members: int) -> tuple[float, ...]:
-    """rho that a set may have: several effects with large remainders at home could be anything."""
-    return SHARES if members == 1 else SHARES[:-1]
+def shares(names: Sequence[str]) -> tuple[float, ...]:
+    """rho that a set may have: several effects with large remainders at home could be anything.
+
+    One on a path and one in flight are two single ones: neither's home is the other's.
+    """
+    return SHARES if together(names) == 1 else SHARES[:-1]
 
 
 def with_terms(form: Form | None, own: UnknownFit | None) -> Form | None:

@@ -13,7 +13,7 @@ from icing_env.record import FloatArray
 from sim2real.devices import within
 from sim2real.form import LEAST, Form, at_home
 from sim2real.generic import UnknownFit
-from sim2real.likeness import MOSTLY, SHAPE, alike, calibration
+from sim2real.likeness import MOSTLY, SHAPE, alike, calibration, foreign
 from sim2real.sets import SetFit
 from sim2real.singles import EffectFit
 
@@ -165,6 +165,8 @@ def is_home(h: Hypothesis, unknown: UnknownFit, told: float, explained: float, r
         raw: inner products of all rows of the bank.
     """
     if len(h.effects) != 1 or h.unknown is not None or not at_home(unknown.component, h.effects):
+        return False
+    if foreign(h.effects[0], unknown, raw):
         return False
     return told > 0.0 and explained > LEAST**2 and (
         explained > MOSTLY * told or alike(h.fit, unknown, raw) > SHAPE or calibration(h.effects[0], unknown, raw))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -10,10 +10,13 @@ from icing_env import effects
 from icing_env.effects import Effect
 from icing_env.record import FloatArray
 from sim2real.bends import bends, natural, scales
-from sim2real.form import LEAST, WORTH, Form, at_home, shares
+from sim2real.form import LEAST, SHARES, WORTH, Form, at_home
 from sim2real.generic import COURSE, UnknownFit
 from sim2real.sets import SetFit
 
+FOREIGN = 0.5  # of the shape of generic terms: an effect to which less of it belongs is not what they are (assumed)
+OF_PATH = {"_gearing": ("1", "position", "position*position*position"), "_lag": ("acceleration", "inertia"),
+           "_offset": ("1", "airspeed", "alpha", "p", "beta")}  # generic terms of its path that each is the like of
 MOSTLY, SHAPE = 0.6, 0.8  # of what generic terms explain, of their shape: an effect that is more of it is what they are
 
 
@@ -36,13 +39,25 @@ def alike(fit: SetFit, unknown: UnknownFit, raw: FloatArray) -> float:
 
 def calibration(name: str, unknown: UnknownFit, raw: FloatArray) -> bool:
     """Whether generic terms are mostly a function of the one reading that an effect scales."""
-    effect = effects.LIBRARY[name]
-    if not (channel := scales(effect)) or unknown.component != f"sensor:{channel}":
-        return False
-    names = [term for term, _, _ in unknown.terms]
-    own = {row: w for term, (row, w) in zip(names, unknown.weights.items(), strict=False)
-           if natural(effect, unknown.component, term)}  # fmt: skip
-    return bool(own) and _cosine(own, unknown.weights, raw) > SHAPE
+    channel = scales(effects.LIBRARY[name])
+    own = {term for term, _, _ in unknown.terms if natural(effects.LIBRARY[name], unknown.component, term)}
+    return bool(channel) and unknown.component == f"sensor:{channel}" and _share(own, unknown, raw) > SHAPE
+
+
+def foreign(name: str, unknown: UnknownFit, raw: FloatArray) -> bool:
+    """Whether generic terms of an actuator's path are mostly of a kind that an effect on it is not.
+
+    What small commands lose is no gearing and no lag, however much of it either explains.
+    """
+    kind = next((OF_PATH[end] for end in OF_PATH if name.endswith(end)), None)
+    return kind is not None and unknown.component.endswith("_path") and _share(kind, unknown, raw) < FOREIGN
+
+
+def _share(own: Collection[str], unknown: UnknownFit, raw: FloatArray) -> float:
+    """Squared cosine between generic terms and some of them, by name."""
+    weights = zip((term for term, _, _ in unknown.terms), unknown.weights.items(), strict=False)
+    part = {row: w for term, (row, w) in weights if term in own}
+    return _cosine(part, unknown.weights, raw) if part else 0.0
 
 
 def _cosine(one: dict[int, float], other: dict[int, float], raw: FloatArray) -> float:
@@ -59,7 +74,7 @@ def is_own(fit: SetFit, unknown: UnknownFit, nothing: float, raw: FloatArray) ->
     What these records do not show by itself has no other form that they show.
     """
     taken, explained = fit.misfit - unknown.misfit, nothing - fit.misfit
-    most = max(shares(len(fit.families))) ** 2 * explained
+    most = (SHARES if len(fit.families) == 1 else SHARES[:-1])[-1] ** 2 * explained
     if explained <= LEAST**2 or not any(_may_be(family.effect, unknown) for family in fit.families):
         return False
     return taken <= most or alike(fit, unknown, raw) > SHAPE or _bent(fit, unknown)

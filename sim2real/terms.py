@@ -58,7 +58,7 @@ BEYOND: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("sensor:ax", "ax", ("q_dot", "alpha")), ("sensor:ay", "ay", ("p_dot", "r_dot")),
     ("sensor:az", "az", ("q", "q_dot")),
     *((f"{s}_path", f"{s}_path", ("1", "position", "acceleration", "inertia", "position*position*position",
-                                  "direction", "airspeed", flow))
+                                  "direction", "side", "airspeed", flow))
       for s, flow in zip(SURFACES, ("alpha", "p", "beta"), strict=True)),
     ("propulsion", "thrust", ("both", "both*airspeed", "left", "left*airspeed")),
 )  # fmt: skip
@@ -66,7 +66,8 @@ BEYOND: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 # that typical effects of the library make).
 GENERIC_SIZE = {"u": 0.008, "w": 0.03, "v": 0.01, "p": 0.002, "q": 0.015, "r": 0.002}
 PATH_SIZE = {"1": 0.5 * math.pi / 180.0, "position": 0.1, "acceleration": 0.0025, "inertia": 0.005,
-             "position*position*position": 0.1, "direction": 0.25 * math.pi / 180.0}  # rad, 1, s2, s2, 1, rad (assumed)
+             "position*position*position": 0.1, "direction": 0.25 * math.pi / 180.0,
+             "side": 0.25 * math.pi / 180.0}  # rad, 1, s2, s2, 1, rad, rad (assumed)
 THRUST_SIZE = 0.1  # (assumed)
 DEVIATION = {"alpha": 0.05, "beta": 0.05, "q": 0.1, "p": 0.2, "r": 0.1, "elevator": 0.04, "aileron": 0.08,
              "rudder": 0.05, "airspeed": 5.0, "CT": 0.015, "phi": 0.2, "theta": 0.1, "ax": 1.0, "ay": 1.0, "az": 2.0,
@@ -131,7 +132,8 @@ def path_courses(flight: Reconstruction, position: FloatArray, names: Sequence[s
     acceleration, share = np.gradient(rate, flight.dt), min(flight.dt / SECOND_ORDER, 1.0)
     course = {"1": np.ones(len(position)), "position": position, "acceleration": acceleration,
               "inertia": lfilter([share], [1.0, share - 1.0], acceleration),
-              "position*position*position": position**3 / reach**2, "direction": np.tanh(rate / 0.02)}  # fmt: skip
+              "position*position*position": position**3 / reach**2, "direction": np.tanh(rate / 0.02),
+              "side": np.tanh(position / 0.02)}  # fmt: skip
     return [PATH_SIZE[name] * course[name] if name in course else PATH_SIZE["1"] * _course(flight, name)
             for name in names]
 

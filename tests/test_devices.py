@@ -8,7 +8,7 @@ import pytest
 
 from icing_env import effects
 from sim2real.candidates import FEW, NODES, at_few_sizes, bank
-from sim2real.devices import apart, within
+from sim2real.devices import apart, together, within
 from sim2real.forgiveness import _leaking, elsewhere
 from sim2real.form import energies
 from sim2real.generic import UnknownFit
@@ -65,3 +65,11 @@ def test_few_sizes_are_the_typical_ones():
         assert p.typical == 0.0 or min(abs(size - p.typical) for size in family.nodes) < 0.1 * (p.high - p.low)
     assert max(len(f.nodes) for f in WHOLE.families) == NODES
     assert replace(few, families=()).linear == tuple(range(1, 1 + len(few.nuisances)))
+
+
+def test_members_on_paths_and_in_flight_do_not_crowd_one_another():
+    assert together(["wing_ice"]) == 1
+    assert together(["aileron_gearing", "vane_position"]) == 1
+    assert together(["aileron_gearing", "rudder_lag", "wing_ice"]) == 1
+    assert together(["aileron_gearing", "aileron_lag"]) == 2
+    assert together(["fin_ice", "wing_ice", "rudder_lag"]) == 2

@@ -28,7 +28,7 @@ from sim2real.generic import UnknownFit, fit_unknown
 from sim2real.home_terms import gain, without
 from sim2real.home_terms import given as after_terms
 from sim2real.hypotheses import set_prior
-from sim2real.likeness import calibration
+from sim2real.likeness import calibration, foreign
 from sim2real.terms import BEYOND, GENERIC, unit_of
 
 TERMS = 6
@@ -196,3 +196,13 @@ def test_a_scale_is_a_function_of_its_own_reading_and_a_bias_of_none():
     assert not calibration("alpha_scale", other, raw)
     assert not calibration("alpha_bias", bent, raw)
     assert not calibration("static_stability", bent, raw)
+
+
+def test_what_small_commands_lose_is_no_form_of_a_gearing():
+    rows = {term.name: term.row for term in bank().terms if term.component == "aileron_path"}
+    raw = np.eye(max(rows.values()) + 1)
+    dead, bent = (UnknownFit("aileron_path", 0.0, tuple((name, w, 0.1) for name, w in terms), 0.0,
+                             {rows[name]: w for name, w in terms})
+                  for terms in ((("side", -0.6), ("position", 0.2)), (("position", 1.0), ("side", 0.2))))
+    assert foreign("aileron_gearing", dead, raw)
+    assert not foreign("aileron_gearing", bent, raw)

@@ -75,7 +75,7 @@ def test_ice_that_grows_is_told_as_it_grew():
 
     found = diagnose([grown("wing_ice", "eta", eta)])
     assert found.hypotheses[0] == {"effects": ["wing_ice"], "unknown": False,
-                                   "probability": pytest.approx(0.86, abs=0.05)}
+                                   "probability": pytest.approx(0.96, abs=0.03)}
     entry = told(found, "wing_ice")
     assert entry["scope"] == SHARED
     assert [s["estimate"] for s in entry["sizes"]] == [size for _, size in entry["history"]]
