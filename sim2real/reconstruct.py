@@ -155,9 +155,10 @@ def reconstruct(record: FlightRecord, base: NDArray | None = None) -> Reconstruc
     moved = {n: values[n] if n in values else np.zeros(len(time)) for n in SURFACES}
     controls = {n: unfiltered(v, float(row["filter_frequency"][0]), dt) for n, v in moved.items()}
     at = grid.time[::every]
-    positions = {n: np.where(_sampled(record, n, at, dt), v, np.nan) if n in values else v for n, v in moved.items()}
+    positions = {n: np.where(_sampled(record, n, at, dt) & (n in values), v, np.nan) for n, v in moved.items()}
     controls["flap"] = values.get("flap", np.zeros(len(time)))
-    notes.extend(f"{n} not recorded: taken as zero" for n in SURFACES if n not in values)
+    notes.extend(f"{n} not recorded: " + ("where its command puts it" if f"{n}_command" in values else "taken as zero")
+                 for n in SURFACES if n not in values)
     source, driving = powers(row, values, altitude, dt, notes)
     controls |= driving
     names = [*(f"{s}_command" for s in SURFACES), "throttle_left", "throttle_right"]

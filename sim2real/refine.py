@@ -254,7 +254,7 @@ class _Search:
         for i in ranked:
             found[i] = replace(found[i], form=with_terms(found[i].form, self._own(i)[0]))
         for i in dict.fromkeys([self.nothing_at_all(), ranked[0], *self._ranked(1)[:1]]):
-            others += self._beside(i)
+            others += self._beside(i) if i in self.left else []
         bound = found[ranked[0]].log_posterior
         chosen = [i for i, h in enumerate(found) if i in self.points or (h.unknown is None and h.log_posterior < bound)]
         flown, kept = [k for k, i in enumerate(chosen) if i in self.points], [found[i] for i in chosen] + others

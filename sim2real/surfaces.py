@@ -38,8 +38,11 @@ def placed(flight: Reconstruction) -> Reconstruction:
     for j, surface in enumerate(SURFACES):
         command = flight.commands.get(f"{surface}_command")
         recorded = flight.positions[surface][np.isfinite(flight.positions[surface])]
+        if command is not None and not len(recorded):
+            controls[surface] = _behind(flight, command, surface, flight.parameters[f"{surface}_lag"][0], False)
+            continue  # nothing says how well it follows: as uncertain as if it had been recorded
         if command is None or not np.any(recorded != recorded[:1]):
-            continue  # not recorded, one or the other
+            continue  # not recorded, or stuck
         law = _law(flight, command, surface)
         if law is not None:
             controls[surface], noise[j] = law
@@ -57,11 +60,7 @@ def _law(flight: Reconstruction, command: FloatArray, surface: str) -> tuple[Flo
     recorded, n = flight.positions[surface][good], int(np.count_nonzero(good))
 
     def behind(lag: float, filtered: bool = True) -> FloatArray:
-        row = flight.parameters.copy()
-        row[f"{surface}_lag"] = lag
-        if not filtered:
-            row["filter_frequency"] = UNFILTERED
-        return _basis(follow(command, command[0], row, surface, flight.dt)[:, 0])
+        return _basis(_behind(flight, command, surface, lag, filtered))
 
     def weights(lag: float, terms: int) -> FloatArray:
         """Of the basis' first terms; the position itself where none is fitted."""
@@ -88,6 +87,15 @@ def _law(flight: Reconstruction, command: FloatArray, surface: str) -> tuple[Flo
         return None
     lag, terms, _ = min(fitting, key=lambda law: square(*law[:2]) / noise**2 + law[2] * np.log(n))
     return np.asarray(behind(lag, filtered=False) @ weights(lag, terms)), PLACED if terms else EXACT
+
+
+def _behind(flight: Reconstruction, command: FloatArray, surface: str, lag: float, filtered: bool) -> FloatArray:
+    """Positions [N] of the published actuator at some lag, behind the recording's low pass or before it."""
+    row = flight.parameters.copy()
+    row[f"{surface}_lag"] = lag
+    if not filtered:
+        row["filter_frequency"] = UNFILTERED
+    return follow(command, command[0], row, surface, flight.dt)[:, 0]
 
 
 def _published(left: FloatArray, basis: FloatArray) -> bool:

@@ -90,3 +90,15 @@ def test_a_short_record_and_a_blank_position_are_no_trouble(flight):
     blank = replace(made, positions=made.positions | {"elevator": np.full(len(made.time), np.nan)})
     assert placed(blank).surface_noise[0] == SURFACE_NOISE
     assert all(np.isfinite(left).all() for _, left, _ in path_residuals(blank, blank.parameters))
+
+
+def test_a_surface_that_was_not_recorded_is_where_its_command_puts_it(flight):
+    """It was taken as zero, and a gearing of minus a half was blamed: nothing judges how well it follows."""
+    record = flight.record
+    bare = reconstruct(replace(record, channels={n: v for n, v in record.channels.items() if n != "rudder"}))
+    found = placed(bare)
+    assert not np.isfinite(found.positions["rudder"]).any()
+    assert "rudder_path" not in {name for name, _, _ in path_residuals(found, found.parameters)}
+    away = found.controls["rudder"] - placed(flight).controls["rudder"]
+    assert np.std(flight.controls["rudder"]) > 5.0 * np.std(away[50:])
+    assert any("rudder not recorded: where its command puts it" in note for note in found.notes)
