@@ -41,16 +41,15 @@ def lateness(lag: float, dt: float) -> float:
 
 def with_recorder(records: Sequence[FlightRecord]) -> list[FlightRecord]:
     """Records that declare no low pass declare the one that their attitudes tell of, where it is not the file's."""
-    silent = [record for record in records if "filter" not in record.meta.sensors]
-    told = [lags for record in silent if (lags := recorder_lags(record)) is not None]
-    if not told:
+    told = recorder_lags([record for record in records if "filter" not in record.meta.sensors])
+    if told is None:
         return list(records)
-    value, error = np.moveaxis(np.array(told), 2, 0)  # [records, axes]
-    pooled = np.sum(value / error**2, axis=0) / np.sum(error**-2.0, axis=0)
-    sharp = np.sum(error**-2.0, axis=0) ** -0.5
-    axis = int(np.argmin(sharp))
-    lag, file = float(pooled[axis]), _published_lag()
-    if sharp[axis] > KNOWN or abs(lag) > LONGEST or abs(lag - file) < max(APART, 3.0 * sharp[axis]):
+    value, error = np.array(told).T  # [axes]
+    weight = error**-2.0 / np.sum(error**-2.0)
+    lag, file = float(value @ weight), _published_lag()
+    contradiction = abs(value[0] - value[1]) / float(np.hypot(*error))  # of one and the same recorder
+    sharp = max(1.0, contradiction) * float(np.sum(error**-2.0) ** -0.5)
+    if sharp > KNOWN or abs(lag) > LONGEST or abs(lag - file) < max(APART, 3.0 * sharp):
         return list(records)
     found = {"filter": {"lag": max(lag, 0.0), "found": True}}
     return [replace(r, meta=replace(r.meta, sensors={**found, **r.meta.sensors})) for r in records]
@@ -61,35 +60,45 @@ def _published_lag() -> float:
     return lateness(1.0 / (2.0 * math.pi * cut), STEP)
 
 
-def recorder_lags(record: FlightRecord) -> list[tuple[float, float]] | None:
+def recorder_lags(records: Sequence[FlightRecord]) -> list[tuple[float, float]] | None:
     """By how much rates show later than attitudes, and its standard error [s], in pitch and in roll; None if unknown.
 
     Beside the lag, integrated rates may differ by their scale and by a part of the other angle (gyros that are not
-    square). Errors are those of spans that count as one each (Liang & Zeger's sandwich, Biometrika 73, 1986).
+    square). Errors are those of spans of all records that count as one each (Liang & Zeger's sandwich, Biometrika 73,
+    1986): of one record's few spans they come out far too small by luck.
     """
+    spans = [found for record in records if (found := _of_attitudes(record)) is not None]
+    return [_lead([own[axis] for own in spans]) for axis in (0, 1)] if spans else None
+
+
+def _of_attitudes(record: FlightRecord) -> tuple[FloatArray, FloatArray] | None:
+    """Rate, angle, other angle and what is missing of the angle's integral in spans [spans, samples, 4], both axes."""
     sparse = [n for n in RATES if n not in record.channels or np.mean(~np.isfinite(record[n])) > MISSING]
     if sparse or len(record) < 20 * FEWEST:
         return None
     grid = common_grid(record)
     p, q, r, phi, theta = (grid.values[n] for n in RATES)
     turning = q * np.sin(phi) + r * np.cos(phi)
-    return [_lead(theta, q * np.cos(phi) - r * np.sin(phi), phi, grid.dt),
-            _lead(phi, p + np.tan(theta) * turning, theta, grid.dt)]
+    return (_in_spans(theta, q * np.cos(phi) - r * np.sin(phi), phi, grid.dt),
+            _in_spans(phi, p + np.tan(theta) * turning, theta, grid.dt))
 
 
-def _lead(angle: FloatArray, turns: FloatArray, other: FloatArray, dt: float) -> tuple[float, float]:
-    """Lag of the rate `turns` behind the `angle` that it makes, and its standard error, s."""
+def _in_spans(angle: FloatArray, turns: FloatArray, other: FloatArray, dt: float) -> FloatArray:
     made = np.concatenate([[0.0], np.cumsum(0.5 * (turns[1:] + turns[:-1]) * dt)])
     columns = np.column_stack([turns, angle, other, angle - made])
     length = min(round(SPAN / dt), len(made) // FEWEST)
     spans = columns[: len(columns) // length * length].reshape(-1, length, 4)
     line = np.linalg.qr(np.column_stack([np.ones(length), np.linspace(-1.0, 1.0, length)]))[0]
-    spans = spans - line @ (line.T @ spans)
-    X, y = spans[:, :, :3], spans[:, :, 3]
-    bread = np.linalg.pinv(np.einsum("sni,snj->ij", X, X))
-    x = bread @ np.einsum("sni,sn->i", X, y)
-    each = np.einsum("sni,sn->si", X, y - X @ x) @ bread
-    count = len(spans)
+    return np.asarray(spans - line @ (line.T @ spans))
+
+
+def _lead(records: Sequence[FloatArray]) -> tuple[float, float]:
+    """Lag of a rate behind the angle that it makes in the spans of some records, and its standard error, s."""
+    bread = np.linalg.pinv(sum(np.einsum("sni,snj->ij", own[:, :, :3], own[:, :, :3]) for own in records))
+    x = bread @ sum(np.einsum("sni,sn->i", own[:, :, :3], own[:, :, 3]) for own in records)
+    each = np.concatenate([np.einsum("sni,sn->si", own[:, :, :3], own[:, :, 3] - own[:, :, :3] @ x)
+                           for own in records]) @ bread
+    count = len(each)
     return float(x[0]), float(np.sqrt(np.sum(each[:, 0] ** 2) * count / (count - 3)) + FLOOR)
 
 

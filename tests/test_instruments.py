@@ -41,7 +41,7 @@ def test_attitudes_tell_how_late_the_rates_are(instruments: str, late: float) ->
     for sigma in (0.0, 0.5, 1.5):
         whole = flown(instruments, sigma=sigma)
         for record in (whole, whole.take(np.arange(len(whole)) % 2 == 0)):
-            _, (lag, error) = recorder_lags(record) or [(0.0, 1.0)] * 2
+            _, (lag, error) = recorder_lags([record]) or [(0.0, 1.0)] * 2
             assert error < 0.0025
             assert abs(lag - late) < 3.0 * error
 
@@ -64,7 +64,7 @@ def test_wrong_attitudes_do_not_change_the_recorder() -> None:
                                      "theta": np.roll(record["theta"], 10)})
     assert with_recorder([late]) == [late]
     slow = np.where(np.arange(len(record)) % 5 == 0, record["phi"], np.nan)
-    assert recorder_lags(replace(record, channels={**record.channels, "phi": slow})) is None
+    assert recorder_lags([replace(record, channels={**record.channels, "phi": slow})]) is None
 
 
 def test_declared_instruments_are_the_models() -> None:
