@@ -93,15 +93,16 @@ def by_channel(energy: FloatArray) -> dict[str, float]:
 def g(energy: FloatArray, alone: FloatArray) -> float:
     """Gap of windows [windows, channels] above that of noise and gust alone [..., windows, channels]."""
     mine = _channel_mean(energy)
-    theirs = np.mean([_channel_mean(a) for a in alone.reshape(-1, *energy.shape)], axis=0)
+    theirs = np.mean(_channel_mean(alone.reshape(-1, *energy.shape)), axis=0)
     excess = np.maximum(mine - theirs, 0.0)
     return float(np.sqrt(np.mean(excess[np.isfinite(excess)])))
 
 
 def _channel_mean(energy: FloatArray) -> FloatArray:
+    """Mean over windows [..., windows, channels]; nan where a channel has none."""
     known = np.isfinite(energy)
-    count = known.sum(axis=0)
-    return np.asarray(np.where(count > 0, np.where(known, energy, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan))
+    count = known.sum(axis=-2)
+    return np.asarray(np.where(count > 0, np.where(known, energy, 0.0).sum(axis=-2) / np.maximum(count, 1), np.nan))
 
 
 def null_quantile(alone: FloatArray, q: float = 0.95) -> float:

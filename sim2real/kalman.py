@@ -67,7 +67,7 @@ def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),)) -
     size[[i for i, n in enumerate(TANGENT) if n.startswith(("dryden", "gust"))]] = 1e-2
     n, m = len(TANGENT), len(spans)
     each = 2 * n + 2 * len(INPUTS) + 1
-    flown = Predictor(flight, np.repeat(flight.parameters, m * each))
+    flown = Predictor(flight, flight.parameters, m * each)
     flown.place_in(spans, each)
     change = np.zeros((each, n))
     change[:n], change[n : 2 * n] = np.diag(size), -np.diag(size)

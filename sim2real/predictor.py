@@ -52,10 +52,10 @@ class Push:
 
 
 class Predictor:
-    """A fleet of variants flown along one record."""
+    """A fleet of variants flown along one record: a PARAMETERS row each, or one row for `n` of them."""
 
-    def __init__(self, flight: Reconstruction, parameters: NDArray) -> None:
-        self.flight, self.n = flight, len(parameters)
+    def __init__(self, flight: Reconstruction, parameters: NDArray, n: int | None = None) -> None:
+        self.flight, self.n = flight, len(parameters) if n is None else n
         self.fleet = Fleet(held(parameters, flight.dt), self.n, flight.dt, max(1, round(flight.dt / 0.02)))
         self.x = self.fleet.state.view(np.float64).reshape(self.n, -1)
 
@@ -96,7 +96,7 @@ class Predictor:
     def read(self) -> FloatArray:
         """What the instruments should read [n, channels of MEASURED]."""
         out = np.empty((self.n, len(MEASURED)))
-        y, p = (a.view(np.float64).reshape(self.n, -1) for a in (self.fleet.measurement, self.fleet.parameters))
+        y, p = (a.view(np.float64).reshape(len(a), -1) for a in (self.fleet.measurement, self.fleet.parameters))
         _PLAIN_READ(out.T, self.x.T, y.T, p.T)
         return out
 
@@ -173,8 +173,12 @@ def typical_state(flight: Reconstruction, span: slice) -> dict[str, float]:
 def typical_states(flight: Reconstruction, spans: Sequence[slice]) -> dict[str, FloatArray]:
     """The same of several spans; the median of the whole record where that is the only one."""
     series = {name: flight.channel(name) for name in MEASURED[:8]} | flight.controls | {"altitude": flight.altitude}
-    typical = np.median if list(spans) == [slice(None)] else np.mean
-    return {name: np.array([typical(values[span]) for span in spans]) for name, values in series.items()}
+    if list(spans) == [slice(None)]:
+        return {name: np.array([np.median(values)]) for name, values in series.items()}
+    ends = np.array([span.indices(len(flight.time))[:2] for span in spans])
+    padded = np.concatenate([np.column_stack(list(series.values())), np.zeros((1, len(series)))])
+    means = np.add.reduceat(padded, ends.ravel())[::2] / np.diff(ends)
+    return dict(zip(series, means.T, strict=True))
 
 
 def put(fleet: Fleet, values: Mapping[str, float | FloatArray]) -> None:
