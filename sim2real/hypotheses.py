@@ -166,7 +166,7 @@ def is_home(h: Hypothesis, unknown: UnknownFit, told: float, explained: float, r
     """
     if len(h.effects) != 1 or h.unknown is not None or not at_home(unknown.component, h.effects):
         return False
-    if foreign(h.effects[0], unknown, raw):
+    if foreign(h.effects[0], unknown, raw) and explained < SHAPE * told:
         return False
     return told > 0.0 and explained > LEAST**2 and (
         explained > MOSTLY * told or alike(h.fit, unknown, raw) > SHAPE or calibration(h.effects[0], unknown, raw))

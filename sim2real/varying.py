@@ -1,11 +1,11 @@
 """A gap that no one size of any effect explains: an effect whose size is another elsewhere, or changes in time.
 
 Ice that grows, or a bias that wanders, is something unknown to all that has one size, and the same generic terms in
-time may follow it. Where something unknown is likeliest, alone or beside one effect, that one, the likeliest of those
-alone and every other that enters where the unknown does are flown with a size for each stretch of every record; their
-departures from a common size are Gaussian (see `sim2real.by_stretch`), and what so many numbers take by luck they pay
-for. Where a second one so varying says it as well, no effect is told by it: what is known is that something there
-varies in time, and that is unknown.
+time may follow it. Where there is a gap for certain, and something unknown is likeliest, alone or beside one effect,
+that one, the likeliest of those alone and every other that enters where the unknown does are flown with a size for each
+stretch of every record; their departures from a common size are Gaussian (see `sim2real.by_stretch`), and what so many
+numbers take by luck they pay for. Where a second one so varying says it as well, no effect is told by it: what is known
+is that something there varies in time, and that is unknown.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.by_stretch import Way, cut_up, gaussian, products, responses, ways, without
 from sim2real.candidates import Bank, Family, shifted, unbroken
+from sim2real.companions import CERTAIN
 from sim2real.courses import projected
 from sim2real.evidence import Evidence
 from sim2real.form import forgiven
@@ -64,7 +65,7 @@ def varying(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
         centre: nuisances [n] that the variants were flown about.
     """
     best = posterior.best
-    if best.unknown is None or len(best.effects) > 1:
+    if posterior.none > CERTAIN or best.unknown is None or len(best.effects) > 1:
         return posterior
     cuts = [cut_up(flight) for flight in flights]
     if len(tried := ways(flights, cuts)[1:]) == 0:  # one short record
