@@ -9,14 +9,14 @@ import numpy as np
 from icing_env import effects
 from icing_env.effects import Effect
 from icing_env.record import FloatArray
-from sim2real.bends import bends, natural, scales
+from sim2real.bends import bends, changes, natural, scales
 from sim2real.form import LEAST, SHARES, WORTH, Form, at_home
 from sim2real.generic import COURSE, UnknownFit
 from sim2real.sets import SetFit
 
 FOREIGN = 0.5  # of the shape of generic terms: an effect to which less of it belongs is not what they are (assumed)
 OF_PATH = {"_gearing": ("1", "position", "position*position*position"), "_lag": ("acceleration", "inertia"),
-           "_offset": ("1", "airspeed", "alpha", "p", "beta")}  # generic terms of its path that each is the like of
+           "_offset": ("1", "airspeed", "alpha", "p", "beta")}  # generic terms that are the like of each of its numbers
 MOSTLY, SHAPE = 0.6, 0.8  # of what generic terms explain, of their shape: an effect that is more of it is what they are
 
 
@@ -47,10 +47,11 @@ def calibration(name: str, unknown: UnknownFit, raw: FloatArray) -> bool:
 def foreign(name: str, unknown: UnknownFit, raw: FloatArray) -> bool:
     """Whether generic terms of an actuator's path are mostly of a kind that an effect on it is not.
 
-    What small commands lose is no gearing and no lag, however much of it either explains.
+    What small commands lose is no gearing and no lag, even where either explains more than half of it.
     """
-    kind = next((OF_PATH[end] for end in OF_PATH if name.endswith(end)), None)
-    return kind is not None and unknown.component.endswith("_path") and _share(kind, unknown, raw) < FOREIGN
+    own = {term for number in changes(effects.LIBRARY[name]) for end, terms in OF_PATH.items() if number.endswith(end)
+           for term in terms}  # fmt: skip
+    return bool(own) and unknown.component.endswith("_path") and _share(own, unknown, raw) < FOREIGN
 
 
 def _share(own: Collection[str], unknown: UnknownFit, raw: FloatArray) -> float:

@@ -207,10 +207,10 @@ class _Search:
 
     def _beside(self, i: int) -> list[Hypothesis]:
         """Something unknown beside a flown set (alone if it is empty), its own form allowed."""
-        known, fits = self.found[i], self._own(i)[1]
-        remainder, gained = self.left[i], 0.0
+        known, remainder, gained = self.found[i], self.left[i], 0.0
         if len(known.effects) > 1:  # a third cause: two effects of no account would pay for its terms
             return []
+        fits = self._own(i)[1]
         if known.effects and known.form is not None:
             ways = [known.form.way(k, self.nothing, self._least(), self._bare()) for k in range(len(known.form.gained))]
             if 0 < (k := int(np.argmax(ways))) <= len(SHARES):

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from sim2real.candidates import bank
+from sim2real.companions import CERTAIN
 from sim2real.forgiveness import ELSEWHERE, _leaking, elsewhere
 from sim2real.generic import UnknownFit
-from sim2real.hypotheses import DOUBT, MOST_DOUBT, Hypothesis, doubt, doubted, normalised
+from sim2real.hypotheses import DOUBT, MOST_DOUBT, Hypothesis, Posterior, doubt, doubted, normalised
 from sim2real.sets import SetFit
+from sim2real.varying import varying
 
 SOMETHING = UnknownFit("x_force", 0.0, (("1", 1.0, 0.1),), 0.0, {})
 
@@ -81,3 +84,13 @@ def test_what_a_form_leaves_elsewhere_grows_slowly():
     assert elsewhere(4.0) == pytest.approx(4.0)
     assert elsewhere(ELSEWHERE) == pytest.approx(ELSEWHERE)
     assert elsewhere(1e3 * ELSEWHERE) == pytest.approx(4.0 * ELSEWHERE)
+
+
+def test_no_size_is_sought_that_varies_where_there_may_be_no_gap():
+    found = normalised(some([0.5, 3.0]), 0.0)
+    told = Posterior(found, {}, (), {}, np.zeros((1, 1)))
+    assert told.best.unknown is not None and told.none > CERTAIN
+    sure = Posterior(normalised(some([0.5, 300.0]), 0.0), {}, (), {}, np.zeros((1, 1)))
+    with pytest.raises((AttributeError, ValueError)):  # there it looks at the records
+        varying([None], bank(), [], None, sure, np.zeros(0))
+    assert varying([None], bank(), [], None, told, np.zeros(0)) is told

@@ -27,8 +27,9 @@ from sim2real.form import (
 from sim2real.generic import UnknownFit, fit_unknown
 from sim2real.home_terms import gain, without
 from sim2real.home_terms import given as after_terms
-from sim2real.hypotheses import set_prior
+from sim2real.hypotheses import Hypothesis, is_home, set_prior
 from sim2real.likeness import calibration, foreign
+from sim2real.sets import SetFit
 from sim2real.terms import BEYOND, GENERIC, unit_of
 
 TERMS = 6
@@ -206,3 +207,9 @@ def test_what_small_commands_lose_is_no_form_of_a_gearing():
                   for terms in ((("side", -0.6), ("position", 0.2)), (("position", 1.0), ("side", 0.2))))
     assert foreign("aileron_gearing", dead, raw)
     assert not foreign("aileron_gearing", bent, raw)
+    whole = next(f for f in bank().families if f.effect.name == "aileron_gearing")
+    raw = np.eye(1 + max(*rows.values(), *whole.rows))
+    geared = Hypothesis(SetFit((whole,), weights={whole.rows[0]: 1.0}), None, 0.0, 0.0)
+    assert not is_home(geared, dead, 1000.0, 700.0, raw)
+    assert is_home(geared, dead, 1000.0, 900.0, raw)  # what explains nearly all is the cause, whatever is left
+    assert is_home(geared, bent, 1000.0, 700.0, raw)

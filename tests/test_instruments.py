@@ -57,6 +57,14 @@ def test_a_recorder_is_found_only_where_it_is_not_the_files() -> None:
     assert with_recorder(declared) == declared
 
 
+@pytest.mark.parametrize(("lags", "found"), [([(0.0030, 0.0005), (0.0076, 0.0009)], False),
+                                             ([(0.0006, 0.0005), (0.0002, 0.0009)], True)])
+def test_pitch_and_roll_have_one_recorder(lags, found, monkeypatch) -> None:
+    """Where they contradict one another, neither is believed: a sharp error is sharp by luck."""
+    monkeypatch.setattr("sim2real.instruments.recorder_lags", lambda records: lags)
+    assert ("filter" in with_recorder([flown()])[0].meta.sensors) == found
+
+
 def test_wrong_attitudes_do_not_change_the_recorder() -> None:
     """A delay far beyond a low pass is somebody else's (`data_checks` names it), and slow attitudes tell nothing."""
     record = flown()
