@@ -76,7 +76,7 @@ def natural(effect: Effect, component: str, term: str) -> bool:
         return True
     own |= COMMON
     if "alphadot" in own:  # in flight hardly another thing than a rate of pitch
-        own |= {"q"}
+        own |= {"q", "alpha_dot"}
     return all(factor in own for factor in term.split("*"))
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from scipy.signal import lfilter
+from scipy.signal import bilinear, lfilter
 
 from icing_env.atmosphere import density
 from icing_env.record import FloatArray
@@ -38,25 +38,31 @@ GENERIC: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     *((f"sensor:{c}", c, ("1", c, f"{c}_dot", "time")) for c in MEASURED[:8]),
     *((f"sensor:{c}", c, ("1", c, "time")) for c in MEASURED[8:12]),
 )
+# Structural modes under an accelerometer: what rings at so many Hz, in phase and a quarter behind. Light transports
+# have their first bending modes there (assumed), and each covers its neighbourhood.
+MODES = tuple(f"{kind}:{hertz:g}" for hertz in (2.0, 3.0, 4.5) for kind in ("rings", "rings_late"))
 # Terms that the effect `discrepancy` cannot fly, and that show where a gap lies nevertheless: across axes, of higher
 # order, in the paths of surfaces (no lags: actuators have their own, and channels are in step to a few ms at best) and
 # in the engines.
 BEYOND: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("x_force", "u", ("beta*beta", "rudder*rudder")),
-    ("z_force", "w", ("beta*beta", "alpha*alpha*alpha")),
-    ("pitching_moment", "q", ("beta*beta", "alpha*alpha*alpha", "elevator*elevator*elevator", "aileron", "p", "r",
-                              "q*q*q", "CT", "alpha*CT")),
-    ("y_force", "v", ("aileron", "alpha*p", "alpha*rudder", "beta*beta*beta", "airspeed")),
-    ("rolling_moment", "p", ("alpha", "q", "alpha*p", "aileron*aileron*aileron", "beta*beta*beta",
-                              "p*p*p", "airspeed", "CT")),
+    ("z_force", "w", ("beta*beta", "alpha*alpha*alpha", "alpha_dot", "CT")),
+    ("pitching_moment", "q", ("beta*beta", "alpha*alpha*alpha", "elevator*elevator*elevator", "elevator*airspeed",
+                              "aileron", "p", "r", "q*q*q", "CT", "alpha*CT", "alpha_dot")),
+    ("y_force", "v", ("aileron", "alpha*p", "alpha*rudder", "beta*beta*beta", "airspeed", "beta_dot")),
+    ("rolling_moment", "p", ("alpha", "q", "alpha*p", "aileron*aileron*aileron", "aileron*airspeed",
+                              "beta*beta*beta", "p*p*p", "airspeed", "CT", "beta_dot")),
     ("yawing_moment", "r", ("alpha", "q", "alpha*p", "alpha*aileron", "alpha*rudder", "beta*beta*beta",
-                            "rudder*rudder*rudder", "r*r*r", "airspeed", "CT", "alpha*CT", "beta*CT")),
-    ("sensor:airspeed", "airspeed", ("alpha", "beta", "airspeed*airspeed")),
-    ("sensor:alpha", "alpha", ("airspeed", "q", "alpha*alpha")), ("sensor:beta", "beta", ("alpha", "p", "r")),
+                            "rudder*rudder*rudder", "rudder*airspeed", "r*r*r", "airspeed", "CT", "alpha*CT", "beta*CT",
+                            "beta_dot")),
+    ("sensor:airspeed", "airspeed", ("alpha", "beta", "airspeed*airspeed", "CT")),
+    ("sensor:alpha", "alpha", ("airspeed", "q", "alpha*alpha", "CT")),
+    ("sensor:beta", "beta", ("alpha", "p", "r", "CT")),
     ("sensor:p", "p", ("q", "r", "az")), ("sensor:q", "q", ("p", "r", "az")), ("sensor:r", "r", ("p", "q", "az")),
-    ("sensor:phi", "phi", ("slow_phi", "slow_ay")), ("sensor:theta", "theta", ("slow_theta", "slow_ax")),
-    ("sensor:ax", "ax", ("q_dot", "alpha")), ("sensor:ay", "ay", ("p_dot", "r_dot")),
-    ("sensor:az", "az", ("q", "q_dot")),
+    ("sensor:phi", "phi", ("theta", "slow_phi", "slow_ay")),
+    ("sensor:theta", "theta", ("phi", "slow_theta", "slow_ax")),
+    ("sensor:ax", "ax", ("q_dot", "alpha", "az")), ("sensor:ay", "ay", ("p_dot", "r_dot", "ax", "az", *MODES)),
+    ("sensor:az", "az", ("q", "q_dot", "ax", *MODES)),
     *((f"{s}_path", f"{s}_path", ("1", "position", "acceleration", "inertia", "position*position*position",
                                   "direction", "side", "airspeed", flow))
       for s, flow in zip(SURFACES, ("alpha", "p", "beta"), strict=True)),
@@ -71,7 +77,10 @@ PATH_SIZE = {"1": 0.5 * math.pi / 180.0, "position": 0.1, "acceleration": 0.0025
 THRUST_SIZE = 0.1  # (assumed)
 DEVIATION = {"alpha": 0.05, "beta": 0.05, "q": 0.1, "p": 0.2, "r": 0.1, "elevator": 0.04, "aileron": 0.08,
              "rudder": 0.05, "airspeed": 5.0, "CT": 0.015, "phi": 0.2, "theta": 0.1, "ax": 1.0, "ay": 1.0, "az": 2.0,
-             "p_dot": 1.0, "q_dot": 0.5, "r_dot": 0.3}  # fmt: skip  # what counts as one unit of a regressor (assumed)
+             "p_dot": 1.0, "q_dot": 0.5, "r_dot": 0.3, "alpha_dot": 0.05, "beta_dot": 0.05,
+             }  # fmt: skip  # what counts as one unit of a regressor (assumed)
+FLOW_RATES, WASHED = ("alpha_dot", "beta_dot"), 0.1  # rates of the flow's angles, and s over which they are taken
+DAMPING = 0.15  # of a mode (assumed: a real one's is less, but its frequency is not the term's)
 FROM_ZERO = ("alpha", "beta", "p", "q", "r")  # channels whose scale counts from zero
 SECOND_ORDER = 0.1  # s, by which an actuator of second order smooths what it lacks in acceleration (assumed)
 ERECTION = 30.0  # s in which a vertical gyro follows a false vertical (assumed)
@@ -171,8 +180,9 @@ def _course(flight: Reconstruction, name: str, aerodynamic: bool = False) -> Flo
     out = np.ones(n)
     for factor in name.split("*"):
         values = _values(flight, factor)
-        away = (values - flight.about.get(factor, float(np.median(values)))) / DEVIATION[factor]
-        if aerodynamic and factor in ("p", "q", "r"):
+        middle = flight.about[factor] if factor in flight.about else float(np.median(values))
+        away = (values - middle) / DEVIATION[factor]
+        if aerodynamic and factor in ("p", "q", "r", *FLOW_RATES):
             speed = flight.channel("airspeed")
             away = away * flight.about.get("airspeed", float(np.median(speed))) / speed
         out = out * away
@@ -186,6 +196,10 @@ def _values(flight: Reconstruction, factor: str) -> FloatArray:
         return np.asarray(both / (flight.channel("airspeed") * _pressed_area(flight)))
     if factor in flight.controls:
         return flight.controls[factor]
+    if factor in FLOW_RATES:
+        values, share = flight.channel(factor.removesuffix("_dot")), 1.0 - math.exp(-flight.dt / WASHED)
+        late, _ = lfilter([share], [1.0, share - 1.0], values, zi=[(1.0 - share) * values[0]])
+        return np.asarray((values - late) * share / ((1.0 - share) * flight.dt))  # over how late a ramp is
     if factor.endswith("_dot"):
         values = flight.channel(factor.removesuffix("_dot"))
         return np.diff(values, prepend=values[:1]) / flight.dt
@@ -200,12 +214,23 @@ def _sensor_course(flight: Reconstruction, name: str, channel: str) -> FloatArra
     if name.startswith("slow_"):
         course, share = _course(flight, name.removeprefix("slow_")), flight.dt / ERECTION
         return np.asarray(tolerance * lfilter([share], [1.0, share - 1.0], course))
+    if name.startswith("rings"):
+        return _ringing(flight, name, channel)
     if name.removesuffix("_dot") != channel:
         return tolerance * _course(flight, name)
     values = flight.channel(channel)
     if name.endswith("_dot"):
         return -0.1 * np.diff(values, prepend=values[:1]) / flight.dt  # backward: nothing of the sample to come
     return 0.1 * (values - (0.0 if channel in FROM_ZERO else flight.about.get(channel, float(np.median(values)))))
+
+
+def _ringing(flight: Reconstruction, name: str, channel: str) -> FloatArray:
+    """A tenth of what a mode makes of a reading: of the samples before, whose noise says nothing of the next."""
+    kind, hertz = name.split(":")
+    w, values = 2.0 * math.pi * float(hertz), flight.channel(channel)
+    above = [2.0 * DAMPING * w, 0.0] if kind == "rings" else [2.0 * DAMPING * w * w]
+    b, a = bilinear(above, [1.0, 2.0 * DAMPING * w, w * w], 1.0 / flight.dt)
+    return np.asarray(0.1 * lfilter([0.0, *b], [*a, 0.0], values - values[0]))
 
 
 def unit_of(term: str, component: str, reach: Mapping[str, float] | None = None) -> float:
@@ -230,7 +255,7 @@ def _unit(term: str, component: str) -> float:
         return THRUST_SIZE / (DEVIATION["airspeed"] if term.endswith("*airspeed") else 1.0)
     target = next(target for where, target, _ in GENERIC if where == component)
     if component.startswith("sensor:"):
-        if term not in ("1", "time") and term.removesuffix("_dot") == target:
+        if term.startswith("rings") or (term not in ("1", "time") and term.removesuffix("_dot") == target):
             return 0.1
         size = TOLERANCE[target]
     else:

@@ -14,6 +14,7 @@ from icing_env.aircraft import load
 from icing_env.types import DERIVATIVE_NAMES
 from sim2real.bends import bends, changes
 from sim2real.candidates import bank
+from sim2real.channels import MEASURED
 from sim2real.courses import Course, Courses, projected
 from sim2real.evidence import gather
 from sim2real.generic import fit_unknown
@@ -24,7 +25,7 @@ from sim2real.reconstruct import Reconstruction, reconstruct
 from sim2real.references import Baseline
 from sim2real.sets import SetFit
 from sim2real.steps import FARTHEST, bounded_step
-from sim2real.terms import BEYOND, GENERIC, Term, in_common, pushes
+from sim2real.terms import BEYOND, GENERIC, Term, _values, in_common, pushes
 from testbed.flight import fly
 
 
@@ -138,6 +139,37 @@ def test_a_term_is_one_function_of_its_regressor_in_all_records(flights):
         assert np.sqrt(np.mean(both**2)) <= 1.0 + 1e-9  # no flight with a cube that nothing reaches
     own = replace(slow, about={})
     assert abs(np.median(course(own, "airspeed") / course(own, "1"))) < 1e-6
+
+
+def test_a_mode_rings_after_what_shakes_it_and_says_nothing_of_the_sample_itself(flights):
+    """A tenth of the reading where it is shaken at the mode's own frequency, a quarter apart."""
+    flight, hertz = flights[0], 3.0
+    time = flight.time - flight.time[0]
+    measured = flight.measured.copy()
+    measured[:, MEASURED.index("az")] = np.sin(2.0 * np.pi * hertz * time)
+    shaken = replace(flight, measured=measured)
+
+    def rings(of: Reconstruction) -> list[np.ndarray]:
+        terms = [Term("sensor:az", f"{kind}:{hertz:g}", "az", 1) for kind in ("rings", "rings_late")]
+        return [push.series for push in pushes(of, terms)]
+
+    settled = slice(round(4.0 / flight.dt), None)
+    both = [series[settled] for series in rings(shaken)]
+    for series in both:
+        assert np.sqrt(2.0 * np.mean(series**2)) == pytest.approx(0.1, rel=0.02)
+    assert abs(np.corrcoef(*both)[0, 1]) < 0.02
+    measured[-1] += 5.0
+    for before, after in zip(rings(shaken), rings(replace(flight, measured=measured)), strict=True):
+        assert np.array_equal(before, after)
+
+
+def test_a_rate_of_the_flow_is_that_of_its_angle(flights):
+    flight = flights[0]
+    time = flight.time - flight.time[0]
+    measured = flight.measured.copy()
+    measured[:, MEASURED.index("alpha")] = 0.02 * time
+    steady = _values(replace(flight, measured=measured), "alpha_dot")
+    assert steady[round(1.0 / flight.dt) :] == pytest.approx(0.02, rel=1e-3)
 
 
 def test_thrust_counts_as_a_coefficient(flights):
