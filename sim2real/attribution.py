@@ -19,7 +19,7 @@ from icing_env.record import FloatArray
 from sim2real.any_course import with_courses
 from sim2real.candidates import NUISANCE_STEP, Bank
 from sim2real.forgiveness import forgive
-from sim2real.form import Form, may_bend, own_terms, room, shares, squares, with_terms
+from sim2real.form import Form, energies, may_bend, own_terms, room, shares, squares, with_terms
 from sim2real.generic import UnknownFit, beside, fit_unknown
 from sim2real.home_terms import gain, without
 from sim2real.hypotheses import (
@@ -231,7 +231,9 @@ def _with_unknown(reduced: FloatArray, raw: FloatArray, bank: Bank, known: Hypot
     own: UnknownFit | None = None
     if known.effects:
         fits = fit_unknown(beside(reduced, bank, known.fit, _slopes(known.fit)), bank)
-        own, fits = split(known.fit, known.form, fits, float(reduced[0, 0]), raw)
+        nothing = float(reduced[0, 0])
+        explained = energies(squares(known.fit, reduced), max(nothing - known.fit.misfit, 0.0))
+        own, fits = split(known.fit, known.form, fits, nothing, raw, explained)
     if not fits:
         return own, []
     best = max(fits, key=lambda u: u.log_evidence)

@@ -10,7 +10,7 @@ import numpy as np
 
 from icing_env import effects
 from sim2real.devices import apart, within
-from sim2real.form import OTHER_FORM, SHARES, forgiven
+from sim2real.form import LEAST, OTHER_FORM, SHARES, forgiven
 from sim2real.generic import UnknownFit
 from sim2real.hypotheses import Hypothesis
 from sim2real.likeness import MOSTLY
@@ -31,8 +31,35 @@ def forgive(found: Sequence[Hypothesis], nothing: float, least: float, bare: flo
     """
     alone = [replace(h, regained=_regained(h, nothing, least, bare)) for h in found]
     larger = alone if believed is None else [alone[i] for i in believed]
-    larger = [h for h in larger if h.unknown is None and len(h.effects) > 1]
-    return _leaking([_with_guests(h, larger, nothing) for h in alone])
+    by_count = dict[int, list[Hypothesis]]()
+    for h in larger:
+        if h.unknown is None and len(h.effects) > 1:
+            by_count.setdefault(len(h.effects), []).append(h)
+    return _leaking(_in_company([_with_guests(h, by_count.get(len(h.effects) + 1, ()), nothing) for h in alone]))
+
+
+def _in_company(found: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Pairs, that regain by form no more than one member does alone and what the other explains gives reason for.
+
+    Terms are linear about where a set was flown, and a little off each time: of a large form that is more than an idle
+    companion costs.
+    """
+    alone = {h.effects[0]: h for h in found if len(h.effects) == 1 and h.unknown is None}
+
+    def most(h: Hypothesis) -> float:
+        out = [np.inf]
+        for family, there in zip(h.fit.families, h.form.free if h.form else (), strict=False):
+            one = alone.get(family.effect.name)
+            if one is None or one.form is None or not np.isfinite([there.beyond, one.form.free[0].beyond]).all():
+                continue
+            plain, free = one.fit.misfit - h.fit.misfit, one.form.free[0].beyond - there.beyond
+            other = max(plain, free)  # what the other explains
+            form = SHARES[-1] ** 2 * other if other > LEAST**2 else 0.0
+            out.append(one.regained + 0.5 * (max(free - plain, 0.0) + form))
+        return min(out)
+
+    return [replace(h, regained=min(h.regained, most(h))) if len(h.effects) == 2 and h.unknown is None else h
+            for h in found]  # fmt: skip
 
 
 def _leaking(found: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -72,12 +99,15 @@ def _with_guests(h: Hypothesis, larger: Sequence[Hypothesis], nothing: float) ->
 
     An actuator of second order looks like lag with some gearing: a little of another effect, at the same place as one
     that explains most, is another form of that.
+
+    Args:
+        larger: sets of one member more.
     """
     if not h.effects or h.unknown is not None:
         return h
     own = set(h.effects)
     gained = [g.log_evidence + g.regained - h.log_evidence for g in larger
-              if len(g.effects) == len(own) + 1 and own < set(g.effects)
+              if own < set(g.effects)
               and all(within(name, h.effects) for name in set(g.effects) - own)
               and nothing - h.fit.misfit > MOSTLY * (nothing - g.fit.misfit)]
     if not gained:

@@ -157,18 +157,20 @@ def squares(fit: SetFit, inner: FloatArray) -> list[float]:
 
 
 def energies(own: Sequence[float], explained: float, missed: Sequence[float] = ()) -> list[float]:
-    """The same, together no more than a set explains; of one alone all of that.
+    """Whitened square that each member of a set explains, together no more than the set; of one alone all of that.
 
-    Two effects that cancel each other explain the less, however large each of them is, and none explains more than the
-    set would miss without it.
+    What the set would miss without it, where that is known, else the square of its own signature. Two effects that
+    cancel each other explain the less, however large each of them is.
 
     Args:
-        missed: that square by member, where it is known.
+        own: `squares`.
+        missed: that square by member; infinite where it is not known.
     """
     if len(own) == 1:
         return [explained]
-    shared = [square * min(explained / max(sum(own), 1e-12), 1.0) for square in own]
-    return [min(of, most) for of, most in zip(shared, missed or [np.inf] * len(own), strict=True)]
+    each = [least if np.isfinite(least) else square
+            for square, least in zip(own, missed or [np.inf] * len(own), strict=True)]
+    return [square * min(explained / max(sum(each), 1e-12), 1.0) for square in each]
 
 
 def room(fit: SetFit, own: Sequence[float], bending: Sequence[float], terms: Sequence[Term], kept: FloatArray,

@@ -62,6 +62,11 @@ class AtLiberty:
         bending = may_bend(beyond, list(map(min, by_slope[1], squares(fit, raw))))
         return rows, room(fit, reduced, bending, own, kept, self.nothing, self.missed)
 
+    def explained(self) -> list[float]:
+        """Whitened square that each member explains (`form.energies`)."""
+        own = squares(self.fit, self.linear.reduced)
+        return energies(own, max(self.nothing - self.fit.misfit, 0.0), self.missed)
+
     def free(self, left: Remainder, beside: UnknownFit | None = None) -> tuple[Liberty, ...]:
         """What free courses of time would take: at home of each effect, or where something unknown is; then at all.
 
@@ -69,8 +74,7 @@ class AtLiberty:
         freedom of its home.
         """
         each = [home((family.effect.name,)) for family in self.fit.families]
-        explained = max(self.nothing - self.fit.misfit, 0.0)
-        most = [FORGIVEN**2 * e for e in energies(squares(self.fit, self.linear.reduced), explained, self.missed)]
+        most = [FORGIVEN**2 * square for square in self.explained()]
         whole = float(left.reduced()[0, 0])
         rest = whole if beside is None else beside.left
         if beside is not None:

@@ -69,16 +69,20 @@ def _cosine(one: dict[int, float], other: dict[int, float], raw: FloatArray) -> 
     return float((a @ inner @ b) ** 2 / max((a @ inner @ a) * (b @ inner @ b), 1e-30))
 
 
-def is_own(fit: SetFit, unknown: UnknownFit, nothing: float, raw: FloatArray) -> bool:
+def is_own(fit: SetFit, unknown: UnknownFit, nothing: float, raw: FloatArray, explained: Sequence[float]) -> bool:
     """Whether what generic terms take beside a set is another form of its effects, by place and by size or shape.
 
+    By size it is the form of one member, as large as that might have by itself: company neither widens nor narrows it.
     What these records do not show by itself has no other form that they show.
+
+    Args:
+        explained: of `form.energies`.
     """
-    taken, explained = fit.misfit - unknown.misfit, nothing - fit.misfit
-    most = (SHARES if len(fit.families) == 1 else SHARES[:-1])[-1] ** 2 * explained
-    if explained <= LEAST**2 or not any(_may_be(family.effect, unknown) for family in fit.families):
+    able = [most for family, most in zip(fit.families, explained, strict=True) if _may_be(family.effect, unknown)]
+    if nothing - fit.misfit <= LEAST**2 or not able:
         return False
-    return taken <= most or alike(fit, unknown, raw) > SHAPE or _bent(fit, unknown)
+    taken = fit.misfit - unknown.misfit
+    return taken <= SHARES[-1] ** 2 * max(able) or alike(fit, unknown, raw) > SHAPE or _bent(fit, unknown)
 
 
 def _may_be(effect: Effect, unknown: UnknownFit) -> bool:
@@ -93,13 +97,16 @@ def _bent(fit: SetFit, unknown: UnknownFit) -> bool:
                for name, _, _ in unknown.terms)  # fmt: skip
 
 
-def split(fit: SetFit, form: Form | None, fits: Sequence[UnknownFit], nothing: float,
-          raw: FloatArray) -> tuple[UnknownFit | None, list[UnknownFit]]:
+def split(fit: SetFit, form: Form | None, fits: Sequence[UnknownFit], nothing: float, raw: FloatArray,
+          explained: Sequence[float]) -> tuple[UnknownFit | None, list[UnknownFit]]:
     """The best of the generic fits beside a set that is its own form, and the fits that are not.
 
     What terms at home do beside a set, and its form does as well, is that form, told in fewer terms.
+
+    Args:
+        nothing, raw, explained: of `is_own`.
     """
     as_well = -np.inf if form is None else float(np.logaddexp.reduce(form.gained))
-    own = [u for u in fits if is_own(fit, u, nothing, raw)
+    own = [u for u in fits if is_own(fit, u, nothing, raw, explained)
            or (at_home(u.component, fit.effects) and WORTH < u.log_evidence <= as_well)]  # fmt: skip
     return max(own, key=lambda u: u.log_evidence, default=None), [u for u in fits if u not in own]

@@ -203,7 +203,8 @@ class _Search:
         known = self.found[i]
         if not known.effects or known.form is None:
             return None, self.generic[i]
-        return split(known.fit, known.form, self.generic[i], self.nothing, self.linear.raw)
+        explained = self._at_liberty(known.fit).explained()
+        return split(known.fit, known.form, self.generic[i], self.nothing, self.linear.raw, explained)
 
     def _beside(self, i: int) -> list[Hypothesis]:
         """Something unknown beside a flown set (alone if it is empty), its own form allowed."""
@@ -217,9 +218,10 @@ class _Search:
                 gained = known.form.gained[k] + float(np.log(OTHER_FORM))
                 remainder = self.bent[i].left if i in self.bent else remainder
                 left = remainder.reduced()
-                left = given(left, *self._at_liberty(known.fit).room(Bent(self.points[i], remainder)), SHARES[k - 1])
+                at_liberty = self._at_liberty(known.fit)
+                left = given(left, *at_liberty.room(Bent(self.points[i], remainder)), SHARES[k - 1])
                 fits = fit_unknown_left(left, self.flying.candidates)
-                fits = split(known.fit, known.form, fits, self.nothing, self.linear.raw)[1]
+                fits = split(known.fit, known.form, fits, self.nothing, self.linear.raw, at_liberty.explained())[1]
         fits = [u for u in fits if not self._named(u, known)]
         if not fits:
             return []

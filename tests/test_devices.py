@@ -9,8 +9,8 @@ import pytest
 from icing_env import effects
 from sim2real.candidates import FEW, NODES, at_few_sizes, bank
 from sim2real.devices import apart, together, within
-from sim2real.forgiveness import _leaking, elsewhere
-from sim2real.form import energies
+from sim2real.forgiveness import _in_company, _leaking, elsewhere
+from sim2real.form import Form, Liberty, energies
 from sim2real.generic import UnknownFit
 from sim2real.hypotheses import Hypothesis
 from sim2real.sets import SetFit
@@ -49,7 +49,9 @@ def test_a_device_is_what_two_faults_share():
 
 def test_a_member_that_a_set_would_not_miss_explains_nothing():
     assert energies([400.0, 300.0], 500.0) == pytest.approx([400.0 * 5 / 7, 300.0 * 5 / 7])
-    assert energies([400.0, 300.0], 500.0, [float("inf"), 2.0]) == pytest.approx([400.0 * 5 / 7, 2.0])
+    assert energies([400.0, 300.0], 500.0, [float("inf"), 2.0]) == pytest.approx([400.0, 2.0])
+    assert energies([40.0, 30.0], 500.0, [450.0, 50.0]) == pytest.approx([450.0, 50.0])  # flown, not as the bank has it
+    assert energies([4e3, 3e3], 500.0, [3e3, 2e3]) == pytest.approx([300.0, 200.0])  # they cancel each other
     assert energies([400.0], 500.0, [1.0]) == [500.0]  # one alone has nothing to be without
 
 
@@ -73,3 +75,19 @@ def test_members_on_paths_and_in_flight_do_not_crowd_one_another():
     assert together(["aileron_gearing", "rudder_lag", "wing_ice"]) == 1
     assert together(["aileron_gearing", "aileron_lag"]) == 2
     assert together(["fin_ice", "wing_ice", "rudder_lag"]) == 2
+
+
+def test_an_idle_companion_regains_nothing_by_the_other_s_form():
+    """Terms are a little off wherever a set was flown; what the companion explains gives the pair its reason."""
+    free, other = Liberty(beyond=1000.0), Liberty(beyond=1e4)
+
+    def pair(misfit: float, beyond: float) -> float:
+        found = [Hypothesis(replace(one("rudder_lag"), misfit=1e4), None, -5.0, 100.0, Form((0.0,), (0.0,), (free,)),
+                            regained=500.0),
+                 Hypothesis(replace(one("rudder_lag", "mass_error"), misfit=misfit), None, -10.0, 101.0,
+                            Form((0.0,), (0.0,), (Liberty(beyond=beyond), other)), regained=530.0)]  # fmt: skip
+        return _in_company(found)[1].regained
+
+    assert pair(9998.0, 998.0) == 500.0
+    assert pair(9998.0, 940.0) == 530.0  # beside a free course it shows
+    assert 500.0 < pair(9990.0, 988.0) < 510.0

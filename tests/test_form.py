@@ -28,7 +28,7 @@ from sim2real.generic import UnknownFit, fit_unknown
 from sim2real.home_terms import gain, without
 from sim2real.home_terms import given as after_terms
 from sim2real.hypotheses import Hypothesis, is_home, set_prior
-from sim2real.likeness import calibration, foreign
+from sim2real.likeness import calibration, foreign, is_own
 from sim2real.sets import SetFit
 from sim2real.terms import BEYOND, GENERIC, unit_of
 
@@ -213,3 +213,16 @@ def test_what_small_commands_lose_is_no_form_of_a_gearing():
     assert not is_home(geared, dead, 1000.0, 700.0, raw)
     assert is_home(geared, dead, 1000.0, 900.0, raw)  # what explains nearly all is the cause, whatever is left
     assert is_home(geared, bent, 1000.0, 700.0, raw)
+
+
+def test_company_neither_widens_nor_narrows_the_form_of_a_member():
+    """A third of what an effect explains may be its own form, with a small effect beside it as without."""
+    families = {f.effect.name: f for f in bank().families}
+    whole, small = families["elevator_lag"], families["mass_error"]
+    raw = np.eye(1 + max(*whole.rows, *small.rows))
+    course = UnknownFit("elevator_path", 1500.0, (("course", 1.0, 0.1),), 5800.0, {})
+    pair = SetFit((whole, small), weights={whole.rows[0]: 1.0, small.rows[0]: 1.0}, misfit=9000.0)
+    one = SetFit((whole,), weights={whole.rows[0]: 1.0}, misfit=9100.0)
+    assert is_own(one, course, 19_000.0, raw, [9900.0])
+    assert is_own(pair, course, 19_000.0, raw, [9900.0, 100.0])
+    assert not is_own(pair, course, 19_000.0, raw, [100.0, 9900.0])  # the small one's home is no room for the large
