@@ -195,7 +195,8 @@ def likelihoods(flight: Reconstruction, options: Sequence[Gain], pushed: Sequenc
         if np.nanmax(np.abs(left[:, i, use]), initial=0.0) >= LOST:
             scores.append(-np.inf)
             continue
-        away = np.nanmedian(np.abs(white - np.nanmedian(white, axis=0)), axis=0)
+        median = np.nanmedian if np.isnan(white).any() else np.median
+        away = median(np.abs(white - median(white, axis=0)), axis=0)
         scores.append(-0.5 * float(np.sum((1.4826 * away) ** 2)) - float(np.sum(np.log(np.diag(factor)))))
     return scores
 

@@ -25,6 +25,7 @@ from sim2real.reconstruct import Reconstruction
 # knows are white, means over 100 samples and over whole records included (`tests/test_whiteness.py`).
 WALK = {"u": 3e-3, "v": 3e-3, "w": 3e-3, "p": 3e-5, "q": 3e-5, "r": 3e-5, "altitude": 5e-3, "phi": 4e-5, "theta": 4e-5}
 WALK_OF_GUST = {"q": 2.5e-4, "phi": 5e-5, "theta": 5e-5}
+DRYDEN = [i for i, name in enumerate(TANGENT) if name.startswith("dryden")]
 INPUTS = dict.fromkeys(SURFACES, 1e-3) | {"power_left": 1e3, "power_right": 1e3}  # steps for slopes, rad and W
 TRANSIENT = 10.0  # s with gains of their own after the start
 SPAN = 1.0  # s along a record that are flown as if at one condition
@@ -109,8 +110,7 @@ def follow(flight: Reconstruction, gain: Gain) -> Gain:
     spans = [slice(k, min(k + each, steps + 1)) for k in range(0, steps, each)]
     P, (Qw, columns) = _start_covariance(gain.sigma), _gusts(flight, gain.sigma)
     D = gain.model[1][:, columns]
-    rate = np.maximum(np.mean(np.isfinite(flight.measured[:, :FED_BACK]), axis=0), 1e-3)
-    noise = np.diag(gain.model[3] - D @ Qw @ D.T) * rate
+    noise = np.diag(gain.model[3] - D @ Qw @ D.T) * np.maximum(read_share(flight), 1e-3)
     K, S = [], []
     for span, A, C, B in zip(spans, *linearise(flight, spans), strict=True):
         model = _noisy(flight, A, C[:FED_BACK], B, gain.sigma, Qw, noise)
@@ -121,10 +121,15 @@ def follow(flight: Reconstruction, gain: Gain) -> Gain:
     return replace(gain, K=np.swapaxes(by_channel, 1, 2), S=np.concatenate(S))
 
 
+def read_share(flight: Reconstruction) -> FloatArray:
+    """Share of the samples at which every fed-back channel was read [FED_BACK]."""
+    return flight.once("read", lambda: np.mean(np.isfinite(flight.measured[:, :FED_BACK]), axis=0))
+
+
 def _gusts(flight: Reconstruction, sigma: float) -> tuple[FloatArray, list[int]]:
     """Covariance of what drives the gusts over a step, and which states it drives."""
     speed, height = float(np.median(flight.channel("airspeed"))), float(np.median(flight.altitude))
-    return gust_noise(sigma, speed, height, flight.dt), [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
+    return gust_noise(sigma, speed, height, flight.dt), DRYDEN
 
 
 def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, sigma: float, Qw: FloatArray,
@@ -138,14 +143,12 @@ def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, 
     """
     worse = flight.inadequacy.walk
     walk = np.array([np.hypot(worse * WALK.get(n, 1e-6), WALK_OF_GUST.get(n, 0.0) * sigma) for n in TANGENT])
-    blank = np.array([not flight.has(name) for name in MEASURED[:FED_BACK]])
-    rate = np.array([max(np.mean(np.isfinite(flight.measured[:, j])), 1e-3) for j in range(FED_BACK)])
+    read = read_share(flight)
     least = np.array([NOISE_FLOOR[name] for name in MEASURED[:FED_BACK]])
-    columns = [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
-    G, D = A[:, columns], C[:, columns]
+    G, D = A[:, DRYDEN], C[:, DRYDEN]
     driven = np.concatenate([flight.surface_noise, flight.power_noise])
     Q = G @ Qw @ G.T + np.diag(walk**2 * flight.dt) + (B * driven**2) @ B.T + _within_steps(A, Qw)
-    R = np.diag(np.where(blank, 1e6, np.maximum(noise, least**2) / rate))
+    R = np.diag(np.where(read == 0.0, 1e6, np.maximum(noise, least**2) / np.maximum(read, 1e-3)))
     return A, C, Q, D @ Qw @ D.T + R, G @ Qw @ D.T
 
 

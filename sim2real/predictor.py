@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icing_env.frames import direction_cosines, to_body
-from icing_env.parameters import copied
+from icing_env.parameters import PARAMETERS, copied
 from icing_env.record import FloatArray
 from icing_env.simulate import Fleet
 from icing_env.types import STATE
@@ -30,6 +30,7 @@ from sim2real.reconstruct import Reconstruction
 QUICK = 8 if llvmlite.binding.get_host_cpu_features().get("avx512f") else 4
 LOST = 1e9  # what a row that flew to no numbers is off by, in any unit
 ANGLES = ("phi", "theta")  # corrected through the quaternion
+NOISES = [name for name in PARAMETERS.names or () if name.startswith("noise_")]
 TANGENT = (*STATES, *ANGLES)
 # over whole arrays the kernels' own text runs as plain NumPy
 _PLAIN_COSINES: Any
@@ -152,9 +153,8 @@ def _listed(items: list[tuple[int, int, FloatArray]]) -> Listed:
 def held(parameters: NDArray, dt: float) -> NDArray:
     """PARAMETERS for a plant whose surfaces and powers follow a record: no noise, no limits, gusts as states."""
     out = copied(parameters)
-    for name in out.dtype.names or ():
-        if name.startswith("noise_"):
-            out[name] = 0.0
+    for name in NOISES:
+        out[name] = 0.0
     for surface in SURFACES:
         out[f"{surface}_lag"], out[f"{surface}_rate"] = SLOW_SURFACE * dt, 1e3
         out[f"{surface}_min"], out[f"{surface}_max"] = -10.0, 10.0

@@ -105,19 +105,13 @@ def ambiguity(reduced: FloatArray, fits: dict[str, EffectFit],
 
     Distance of i to j: the least over j's size (linear about its fit) of the whitened difference of their signatures.
     """
-    out = {}
-    for name, fit in fits.items():
-        rows, w = list(fit.weights), np.array(list(fit.weights.values()))
-        near = []
-        for other, rival in fits.items():
-            if other == name or probability[other] < 1e-4 * max(probability.values()):
-                continue
-            rows2, w2 = list(rival.weights), np.array(list(rival.weights.values()))
-            own = float(w @ reduced[np.ix_(rows, rows)] @ w)
-            theirs = float(w2 @ reduced[np.ix_(rows2, rows2)] @ w2)
-            cross = float(w @ reduced[np.ix_(rows, rows2)] @ w2)
-            apart = own - cross**2 / theirs if theirs > 0.0 else own
-            if own > 0.0 and np.sqrt(max(apart, 0.0)) < INDISTINGUISHABLE:
-                near.append(other)
-        out[name] = tuple(near)
-    return out
+    names = list(fits)
+    weights = np.zeros((len(names), len(reduced)))
+    for i, fit in enumerate(fits.values()):
+        weights[i, list(fit.weights)] = list(fit.weights.values())
+    inner = weights @ reduced @ weights.T
+    own = np.diag(inner)
+    apart = own[:, None] - np.where(own > 0.0, inner**2 / np.where(own > 0.0, own, 1.0), 0.0)
+    near = (own[:, None] > 0.0) & (np.sqrt(np.maximum(apart, 0.0)) < INDISTINGUISHABLE)
+    near &= np.array([probability[name] >= 1e-4 * max(probability.values(), default=0.0) for name in names], bool)
+    return {name: tuple(names[j] for j in np.flatnonzero(near[i]) if j != i) for i, name in enumerate(names)}

@@ -91,9 +91,7 @@ def _left(flight: Reconstruction, surface: str, lags: FloatArray) -> FloatArray:
     recorded = flight.positions[surface]
     good, (_, noise) = np.isfinite(recorded), position_noise(flight, surface)
     where = follow(flight.commands[f"{surface}_command"], recorded[good][0], rows, surface, flight.dt)[good]
-    out = np.empty(len(lags))
-    for i, position in enumerate(where.T):
-        basis = np.column_stack([position, np.ones(len(position))]) / noise[good, None]
-        wanted = recorded[good] / noise[good]
-        out[i] = np.sum((wanted - basis @ np.linalg.lstsq(basis, wanted, rcond=None)[0]) ** 2)
-    return out
+    wanted, weight = recorded[good, None], noise[good, None] ** -2.0
+    away, left = (x - np.sum(weight * x, axis=0) / np.sum(weight) for x in (where, wanted))
+    gear = np.sum(weight * away * left, axis=0) / np.maximum(np.sum(weight * away**2, axis=0), 1e-300)
+    return np.asarray(np.sum(weight * (left - gear * away) ** 2, axis=0))

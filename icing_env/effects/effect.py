@@ -38,7 +38,7 @@ class Parameter:
     high: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Effect:
     """A difference between an aircraft and its model.
 
