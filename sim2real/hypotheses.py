@@ -21,10 +21,9 @@ from sim2real.singles import EffectFit
 P_NONE, P_UNKNOWN, P_PAIRS, P_TRIPLES, P_BESIDE = 0.8, 0.02, 0.028, 0.0008, 0.0028
 SAME_PLACE = 0.02  # of that where two members are faults of one device: another form of one is likelier (assumed)
 # Of the probability, that the evidence misleads: where the library's own form explains a gap, again for each ten times
-# that another form regains in log evidence, and at most. Of answers to gaps of development, 70 of 73 were right where
-# forms regained less than 3, and 35 of 50 where they regained more than 100.
-DOUBT, PER_DECADE, MOST_DOUBT = 0.04, 0.08, 0.25
-NEXT = 0.9  # of the doubt, that it is one of those ranked next, each half as likely as the one before (assumed)
+# that another form regains in log evidence, and at most. Chosen on 249 answers to gaps of development.
+DOUBT, PER_DECADE, MOST_DOUBT = 0.03, 0.04, 0.15
+NEXT = 0.8  # of the doubt, that it is one of those ranked next, each half as likely as the one before (assumed)
 KEPT = 1e-5  # sets of several effects less probable than this are dropped
 
 
