@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ EXAMPLE = """icing benchmark speed --json
 icing benchmark characterisation --quick --figure out/reliability.png
 icing benchmark protection --encounters 200 --json
 icing benchmark diagnosis --quick --out out/withheld
+icing benchmark diagnosis --pool out/first --pool out/second
 icing benchmark diagnosis --jsbsim"""
 
 
@@ -34,6 +36,8 @@ icing benchmark diagnosis --jsbsim"""
 @click.option("--fresh-seed", is_flag=True, help="diagnosis: a sealed set, its seed from the operating system.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/withheld"),
               show_default=True, help="diagnosis: records, keys, answers; an interrupted run goes on from there.")
+@click.option("--pool", multiple=True, type=click.Path(path_type=Path, file_okay=False),
+              help="diagnosis: draw and solve nothing, score the sets of these --out folders together.")
 @click.option("--jsbsim", is_flag=True, help="diagnosis: JSBSim's DHC-6 as the aircraft; 16 cases if not told.")
 @click.option("--jsbsim-root", type=click.Path(file_okay=False), help="diagnosis: a JSBSim tree; else JSBSIM_ROOT.")
 @click.option("--ledger", type=click.Path(path_type=Path, dir_okay=False),
@@ -43,7 +47,8 @@ icing benchmark diagnosis --jsbsim"""
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="diagnosis: processes.")
 def command(name: str, quick: bool, weights: Path | None, figure: Path | None, encounters: int | None,
             only: str | None, cases: int | None, fresh_seed: bool, out: Path, ledger: Path | None, workers: int,
-            without: bool, rivals: bool, jsbsim: bool, jsbsim_root: str | None, as_json: bool, seed: int) -> None:
+            without: bool, rivals: bool, pool: tuple[Path, ...], jsbsim: bool, jsbsim_root: str | None,
+            as_json: bool, seed: int) -> None:
     """Measure the testbed.
 
     `speed`: one aircraft and batches, with and without observer, one thread, beside JSBSim in the same run (if it is
@@ -67,6 +72,9 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
     if name == "diagnosis" and (jsbsim or jsbsim_root):
         _jsbsim(cases, seed, out / "jsbsim", workers, jsbsim_root, as_json)
         return
+    if name == "diagnosis" and pool:
+        _pooled(pool, as_json)
+        return
     if name == "diagnosis":
         _diagnosis(quick, cases, None if fresh_seed else seed, out, ledger, workers, without, rivals, as_json)
         return
@@ -78,11 +86,7 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
     found = measure(quick, weights, lambda what: click.echo(f"{what} ...", err=True))
     if figure is not None:
         draw(found, figure)
-    if as_json:
-        print_json(found)
-        return
-    for title, headers, rows in tables(found):
-        print_table(title, headers, rows)
+    _show(found, tables(found), as_json)
 
 
 def _cases(name: str, only: str | None, as_json: bool) -> None:
@@ -105,11 +109,7 @@ def _adaptation(quick: bool, as_json: bool) -> None:
     from testbed.adaptation_study import measure, tables
 
     found = measure(quick, lambda what: click.echo(f"{what} ...", err=True))
-    if as_json:
-        print_json(found)
-        return
-    for title, headers, rows in tables(found):
-        print_table(title, headers, rows)
+    _show(found, tables(found), as_json)
 
 
 def _diagnosis(quick: bool, cases: int | None, seed: int | None, out: Path, ledger: Path | None, workers: int,
@@ -120,10 +120,23 @@ def _diagnosis(quick: bool, cases: int | None, seed: int | None, out: Path, ledg
                     without, rivals)
     if ledger is not None:
         enter_ledger(ledger, found, out)
+    _show(found, tables(found), as_json)
+
+
+def _pooled(folders: tuple[Path, ...], as_json: bool) -> None:
+    from testbed.diagnosis_benchmark import tables
+    from testbed.pooled_sets import pooled
+
+    found = pooled(folders)
+    _show(found, tables(found), as_json)
+
+
+def _show(found: Any, tables: Iterable[tuple[str, dict[str, str], list[list[str]]]], as_json: bool) -> None:
+    """What was measured: as JSON, or as tables for people."""
     if as_json:
         print_json(found)
         return
-    for title, headers, rows in tables(found):
+    for title, headers, rows in tables:
         print_table(title, headers, rows)
 
 
@@ -131,11 +144,7 @@ def _jsbsim(cases: int | None, seed: int, out: Path, workers: int, root: str | N
     from testbed.jsbsim_benchmark import measure, tables
 
     found = measure(out, cases, seed, workers, root, lambda what: click.echo(what, err=True))
-    if as_json:
-        print_json(found)
-        return
-    for title, headers, rows in tables(found):
-        print_table(title, headers, rows)
+    _show(found, tables(found), as_json)
 
 
 def _protection(quick: bool, encounters: int | None, only: str | None, as_json: bool) -> None:
@@ -146,11 +155,7 @@ def _protection(quick: bool, encounters: int | None, only: str | None, as_json: 
         if name not in WHO:
             raise InputError(f"no row '{name}' of the protection benchmark: {nearest(name, list(WHO))}")
     found = measure(quick, encounters, lambda what: click.echo(f"{what} ...", err=True), names)
-    if as_json:
-        print_json(found)
-        return
-    for title, headers, rows in tables(found):
-        print_table(title, headers, rows)
+    _show(found, tables(found), as_json)
 
 
 def _speed(as_json: bool) -> None:

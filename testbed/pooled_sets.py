@@ -1,0 +1,65 @@
+"""Score sets together that one solver answered: many cases in parts, each drawn, sealed and solved by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from icing_env.errors import InputError
+from testbed.withheld.files import read_json, tampered
+from testbed.withheld.refly import FLOWN_AGAIN
+from testbed.withheld.score import score
+
+PARTS = ("answers", "keys", "refly")
+
+
+def pooled(folders: Sequence[Path]) -> dict[str, Any]:
+    """Every figure of `testbed.withheld.score` over the cases of all folders.
+
+    Raises:
+        InputError: a folder is not a set whose every case is answered and flown again, its records or keys are not
+            those of its manifest, one is sealed and another is not, or another solver (other sources) answered.
+    """
+    sets = [_whole(folder) for folder in folders]
+    for what in ("set", "sources"):
+        values = {entry[what]: folder for folder, entry in zip(folders, sets, strict=True)}
+        if len(values) > 1:
+            told = ", ".join(f"{folder}: {value}" for value, folder in values.items())
+            raise InputError(f"--pool: sets of different {what} ({told}); give those of one solver and kind")
+    with TemporaryDirectory() as name:
+        for part in PARTS:
+            (Path(name) / part).mkdir()
+            for folder in folders:
+                for path in (folder / part).glob("*.json"):
+                    if path.stem != "seed":
+                        (Path(name) / part / path.name).symlink_to(path.resolve())
+        found = score(*(Path(name) / part for part in PARTS))
+    return found | sets[0]
+
+
+def _whole(folder: Path) -> dict[str, Any]:
+    """Kind of a set and sources of its answers, once it is known to be complete."""
+    if not (folder / "manifest.json").is_file():
+        raise InputError(f"--pool {folder}: no manifest.json; give the --out of a run that ended")
+    committed = read_json(folder / "manifest.json")
+    wrong = tampered(folder / "records", folder / "keys", committed)
+    if wrong:
+        raise InputError(f"--pool {folder}: records or keys of {len(wrong)} cases are not those of the manifest, "
+                         f"the first is {wrong[0]}")
+    wanted = {part: [name for name in committed["cases"] if part != "refly" or _flown_again(folder, name)]
+              for part in ("answers", "refly")}  # fmt: skip
+    lacking = [f"{part}/{name}.json" for part, names in wanted.items() for name in names
+               if not (folder / part / f"{name}.json").is_file()]  # fmt: skip
+    if lacking:
+        raise InputError(f"--pool {folder}: {len(lacking)} files are not there, the first is {lacking[0]}; "
+                         "let its run end first")
+    answers = (read_json(folder / "answers" / f"{name}.json") for name in committed["cases"])
+    sources = sorted({a["provenance"]["sources"] for a in answers if "provenance" in a})
+    kind = "sealed" if committed["development_seed"] is None else "development"
+    return {"set": kind, "sources": " and ".join(sources)}
+
+
+def _flown_again(folder: Path, name: str) -> bool:
+    return read_json(folder / "keys" / f"{name}.json")["tier"] in FLOWN_AGAIN

@@ -1,0 +1,65 @@
+"""Sets scored together: the figures are those of all their cases, and only whole sets of one solver are taken."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from test_withheld_score import answer, key, write
+
+from icing_env.errors import InputError
+from testbed.pooled_sets import pooled
+from testbed.withheld import files
+
+RIGHT, WRONG = "effect_1", "effect_2"
+
+
+def a_set(folder: Path, right: int, wrong: int, sources: str = "one solver", **committed) -> Path:
+    """A whole set of single effects, so many of them named and so many not, names its own."""
+    folder.mkdir()
+    pairs = [(answer([RIGHT if i < right else WRONG]) | {"provenance": {"sources": sources}},
+              key("single", [RIGHT], 0.0)) for i in range(right + wrong)]  # fmt: skip
+    write(folder, pairs)
+    names = [f"{folder.name}_{i}" for i in range(len(pairs))]
+    (folder / "refly").mkdir()
+    for i, name in enumerate(names):
+        for part in ("answers", "keys"):
+            (folder / part / f"c{i:03}.json").rename(folder / part / f"{name}.json")
+        (folder / "refly" / f"{name}.json").write_text(json.dumps({"after": 0.1, "own_after": 0.1}))
+        (folder / "records" / name).mkdir(parents=True)
+        (folder / "records" / name / "1.csv").write_text("time\n0.0\n")
+    told = files.manifest(folder / "records", folder / "keys", names) | {"development_seed": None} | committed
+    (folder / "manifest.json").write_text(json.dumps(told))
+    return folder
+
+
+def test_figures_are_those_of_all_cases(tmp_path):
+    first, second = a_set(tmp_path / "a", 3, 1), a_set(tmp_path / "b", 1, 3)
+    assert pooled([first])["top1"] == 0.75
+    found = pooled([first, second])
+    assert (found["cases"], found["top1"], found["set"], found["sources"]) == (8, 0.5, "sealed", "one solver")
+
+
+def test_only_whole_sets_of_one_solver_and_kind_are_scored_together(tmp_path):
+    first = a_set(tmp_path / "a", 2, 0)
+    with pytest.raises(InputError, match="different sources"):
+        pooled([first, a_set(tmp_path / "b", 2, 0, "another")])
+    with pytest.raises(InputError, match="different set"):
+        pooled([first, a_set(tmp_path / "c", 2, 0, development_seed=1)])
+    with pytest.raises(InputError, match="no manifest"):
+        pooled([first, tmp_path / "nowhere"])
+
+
+@pytest.mark.parametrize("part", ["answers", "refly"])
+def test_a_set_whose_run_has_not_ended_is_not_scored(tmp_path, part):
+    (a_set(tmp_path / "a", 2, 0) / part / "a_1.json").unlink()
+    with pytest.raises(InputError, match=f"1 files are not there, the first is {part}/a_1.json"):
+        pooled([tmp_path / "a"])
+
+
+def test_changed_keys_are_told(tmp_path):
+    changed = a_set(tmp_path / "a", 2, 0) / "keys" / "a_0.json"
+    changed.write_text(changed.read_text().replace(RIGHT, WRONG))
+    with pytest.raises(InputError, match="1 cases are not those of the manifest, the first is a_0"):
+        pooled([tmp_path / "a"])
