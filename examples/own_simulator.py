@@ -66,8 +66,8 @@ def rollout(initial_state, controls, dt, parameters):
 
 if __name__ == "__main__":
     from icing_env import scenario
+    from sim2real.closing.missing_terms import missing_terms, residual_coefficients
     from sim2real.diagnosis import diagnose
-    from sim2real.missing_terms import missing_terms, residual_coefficients
     from sim2real.rollout import gap_by_channel
     from sim2real.words import sentences
     from testbed.flight import fly

@@ -14,26 +14,26 @@ from icing_env import aircraft, effects
 from icing_env.errors import InputError, nearest
 from icing_env.jit import source_hash
 from icing_env.record import DataProblem, FlightRecord
-from sim2real import gap
-from sim2real.candidates import SPREAD, Bank, bank, not_testable
-from sim2real.discrepancy import Description, describe_unknown, described, in_other_form
-from sim2real.evidence import Evidence
-from sim2real.form import at_home
-from sim2real.history import SAME, History, histories
-from sim2real.hypotheses import P_NONE, P_UNKNOWN, Hypothesis, Posterior
-from sim2real.instruments import with_recorder
+from sim2real.actuators.surfaces import placed
+from sim2real.actuators.timing import in_step
+from sim2real.baseline.references import Baseline, fit_baseline
+from sim2real.closing import gap
+from sim2real.closing.discrepancy import Description, describe_unknown, described, in_other_form
+from sim2real.closing.remedy import Remedy, leading, remedy, resimulation, values_of
 from sim2real.ladder import ladder
-from sim2real.limits import limits
-from sim2real.manoeuvre import next_manoeuvre
-from sim2real.reconstruct import Reconstruction, reconstruct
-from sim2real.references import Baseline, fit_baseline
-from sim2real.remedy import Remedy, leading, remedy, resimulation, values_of
+from sim2real.library.candidates import SPREAD, Bank, bank, not_testable
+from sim2real.library.terms import in_common
+from sim2real.over_time.history import SAME, History, histories
+from sim2real.planning.limits import limits
+from sim2real.planning.manoeuvre import next_manoeuvre
+from sim2real.posterior.form import at_home
+from sim2real.posterior.hypotheses import P_NONE, P_UNKNOWN, Hypothesis, Posterior
+from sim2real.posterior.singles import EffectFit
+from sim2real.records.instruments import with_recorder
+from sim2real.records.reconstruct import Reconstruction, reconstruct
+from sim2real.records.side_by_side import algebra_in_one_thread, each
 from sim2real.rollout import Rollout, difference, flying_as
-from sim2real.side_by_side import algebra_in_one_thread, each
-from sim2real.singles import EffectFit
-from sim2real.surfaces import placed
-from sim2real.terms import in_common
-from sim2real.timing import in_step
+from sim2real.signatures.evidence import Evidence
 from sim2real.weigh import Progress, fit
 from sim2real.where import components, regimes
 

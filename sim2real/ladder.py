@@ -15,18 +15,18 @@ from typing import Any
 import numpy as np
 
 from icing_env.record import FloatArray
-from sim2real import black_box, gap
-from sim2real.candidates import Bank, not_testable
-from sim2real.channels import MEASURED
-from sim2real.discrepancy import describe_unknown
-from sim2real.evidence import Evidence
-from sim2real.hypotheses import Hypothesis, Posterior
-from sim2real.paths import driven
-from sim2real.reconstruct import Reconstruction
-from sim2real.references import Baseline
-from sim2real.remedy import Remedy, remedy
+from sim2real.actuators.paths import driven
+from sim2real.baseline.references import Baseline
+from sim2real.closing import black_box, gap
+from sim2real.closing.discrepancy import describe_unknown
+from sim2real.closing.remedy import Remedy, remedy
+from sim2real.library.candidates import Bank, not_testable
+from sim2real.posterior.hypotheses import Hypothesis, Posterior
+from sim2real.prediction.windows import COMPARED, FREE, fly
+from sim2real.records.channels import MEASURED
+from sim2real.records.reconstruct import Reconstruction
+from sim2real.signatures.evidence import Evidence
 from sim2real.weigh import Progress, fit
-from sim2real.windows import COMPARED, FREE, fly
 
 PIECE = 20.0  # s of a synthetic record: flown open loop, gusts carry it off
 Rung = dict[str, Any]

@@ -14,7 +14,7 @@ A simulator started anew has forgotten what it remembers beside the state of the
 tail, lags of its own). What that is worth is found where it has flown for 0.3 s and more: its acceleration there less
 that of a restart from the same state. For ours likewise; the difference is added.
 
-A gap can also be told without any effect: `sim2real.missing_terms`.
+A gap can also be told without any effect: `sim2real.closing.missing_terms`.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ from icing_env.atmosphere import density
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
 from icing_env.sensors import SENSOR_PARAMETERS
-from sim2real.channels import TOLERANCE
-from sim2real.predictor import Predictor, put
-from sim2real.reconstruct import LONGITUDINAL, Inadequacy, Reconstruction, reconstruct
-from sim2real.windows import COMPARED, FREE, cut
+from sim2real.prediction.predictor import Predictor, put
+from sim2real.prediction.windows import COMPARED, FREE, cut
+from sim2real.records.channels import TOLERANCE
+from sim2real.records.reconstruct import LONGITUDINAL, Inadequacy, Reconstruction, reconstruct
 
 BEGIN = 0.5  # s of the record that the start of a window is taken from
 SMOOTH = 0.3  # s of the measured states from which both simulators are started at every sample

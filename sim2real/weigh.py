@@ -8,25 +8,25 @@ from dataclasses import replace
 import numpy as np
 
 from icing_env.record import FloatArray
-from sim2real.any_course import course_fits
-from sim2real.attribution import Linear, attribute, least_misfit, nuisance_mean, of_one, reduce, with_prior
-from sim2real.candidates import Bank, at_few_sizes
-from sim2real.companions import leading
-from sim2real.courses import Course, Courses
-from sim2real.evidence import Evidence
-from sim2real.generic import UnknownFit
-from sim2real.hypotheses import Hypothesis, Posterior, doubted, leaving_out, normalised
-from sim2real.kalman import Gain
-from sim2real.points import Flying
-from sim2real.reconstruct import Reconstruction
-from sim2real.references import Baseline
-from sim2real.refine import refine
-from sim2real.screen import Points, screen, screened
-from sim2real.settling import departs, differ, followed, gains_with, gather_about, length, model_alone, nearer
-from sim2real.singles import fit_family
-from sim2real.steps import FARTHEST, Places
-from sim2real.tempering import noise, temper, total
-from sim2real.varying import varying
+from sim2real.baseline.references import Baseline
+from sim2real.flown.companions import leading
+from sim2real.flown.points import Flying
+from sim2real.flown.refine import refine
+from sim2real.flown.screen import Points, screen, screened
+from sim2real.flown.settling import departs, differ, followed, gains_with, gather_about, length, model_alone, nearer
+from sim2real.flown.steps import FARTHEST, Places
+from sim2real.library.candidates import Bank, at_few_sizes
+from sim2real.over_time.varying import varying
+from sim2real.posterior.any_course import course_fits
+from sim2real.posterior.attribution import Linear, attribute, least_misfit, nuisance_mean, of_one, reduce, with_prior
+from sim2real.posterior.generic import UnknownFit
+from sim2real.posterior.hypotheses import Hypothesis, Posterior, doubted, leaving_out, normalised
+from sim2real.posterior.singles import fit_family
+from sim2real.prediction.kalman import Gain
+from sim2real.records.reconstruct import Reconstruction
+from sim2real.signatures.courses import Course, Courses
+from sim2real.signatures.evidence import Evidence
+from sim2real.signatures.tempering import noise, temper, total
 
 RELINEARISE = 8.0  # whitened distance of the fitted nuisances beyond which all is flown again about them
 AGAIN = 2  # times at most

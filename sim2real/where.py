@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, false_discovery_control
 
 from icing_env.record import FloatArray
-from sim2real.channels import MEASURED
-from sim2real.evidence import Evidence
-from sim2real.hypotheses import Posterior
-from sim2real.reconstruct import Reconstruction
+from sim2real.posterior.hypotheses import Posterior
+from sim2real.records.channels import MEASURED
+from sim2real.records.reconstruct import Reconstruction
+from sim2real.signatures.evidence import Evidence
 
 REGIME_VARIABLES = ("alpha", "airspeed", "beta", "q", "p", "elevator", "aileron", "rudder", "power", "ice", "time")
 BINS = 4

@@ -10,7 +10,7 @@ import numpy as np
 from icing_env import effects, record
 from icing_env.record import FlightRecord
 from icing_env.scenario import load
-from sim2real import gap
+from sim2real.closing import gap
 from sim2real.diagnosis import Diagnosis, diagnose
 from sim2real.words import sentences
 from testbed.demo_parts import Tell, Verdict, write_verdicts

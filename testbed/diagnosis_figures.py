@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from sim2real import gap
-from sim2real.channels import MEASURED
+from sim2real.closing import gap
+from sim2real.prediction.windows import COMPARED
+from sim2real.records.channels import MEASURED
 from sim2real.where import Stretch
-from sim2real.windows import COMPARED
 from testbed.plot_style import ROLES, scale_of, styled
 
 

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from icing_env.record import FloatArray
-from sim2real import gap
-from sim2real.channels import TOLERANCE
+from sim2real.actuators.paths import driven
+from sim2real.closing import gap
 from sim2real.diagnosis import Diagnosis
-from sim2real.paths import driven
+from sim2real.prediction.windows import COMPARED, cut, residuals
+from sim2real.records.channels import TOLERANCE
 from sim2real.where import stretches
-from sim2real.windows import COMPARED, cut, residuals
 from sim2real.words import of_the_model, sentences
 from testbed.commands.common import plain
 from testbed.diagnosis_figures import bars, heat, ladder_gaps, regime_heat, size_histories

@@ -13,7 +13,7 @@ from icing_env.errors import InputError
 from testbed.commands.common import Function, print_json, print_table
 
 if TYPE_CHECKING:
-    from sim2real.plan import Plan
+    from sim2real.planning.plan import Plan
 
 MOST_NAMED = 3  # effects that one would be taken for, in the table; --json has all
 OF_RECORDS = {"records": "RECORD", "held_out": "--held-out", "reference": "--reference", "out": "--out",
@@ -69,8 +69,8 @@ def show_plan(names: tuple[str, ...], without: tuple[str, ...], as_json: bool, g
     """
     from rich.console import Console
 
-    from sim2real.plan import ALTITUDE, GUSTS, plan
-    from sim2real.planned import named
+    from sim2real.planning.plan import ALTITUDE, GUSTS, plan
+    from sim2real.planning.planned import named
 
     with Console(stderr=True).status("planning") as status:
         found = plan(named(names, 1.0 if amplitude is None else amplitude), GUSTS if gusts is None else gusts,

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from icing_env import scenario
-from sim2real.abreast import Abreast
-from sim2real.evidence import SIGMAS, choose_gain
-from sim2real.kalman import Gain, follow, gains
-from sim2real.predictor import Push, innovations
-from sim2real.reconstruct import Reconstruction, reconstruct
+from sim2real.prediction.abreast import Abreast
+from sim2real.prediction.kalman import Gain, follow, gains
+from sim2real.prediction.predictor import Push, innovations
+from sim2real.records.reconstruct import Reconstruction, reconstruct
+from sim2real.signatures.evidence import SIGMAS, choose_gain
 from testbed.flight import fly
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from icing_env import scenario
-from sim2real.along import REST
-from sim2real.channels import MEASURED, SURFACES
-from sim2real.predictor import Predictor
-from sim2real.reconstruct import Reconstruction, reconstruct
+from sim2real.prediction.along import REST
+from sim2real.prediction.predictor import Predictor
+from sim2real.records.channels import MEASURED, SURFACES
+from sim2real.records.reconstruct import Reconstruction, reconstruct
 from testbed.flight import fly
 
 SIDES = ("left", "right")
@@ -48,10 +48,10 @@ def test_free_flight_is_the_simulators(flight: Reconstruction, rows: int) -> Non
 
 def test_a_row_flies_alone_as_in_a_batch(flight: Reconstruction) -> None:
     """To the bit, with feedback and with pushes."""
-    from sim2real.candidates import bank, parameter_rows
-    from sim2real.kalman import gains
-    from sim2real.predictor import innovations
-    from sim2real.terms import pushes
+    from sim2real.library.candidates import bank, parameter_rows
+    from sim2real.library.terms import pushes
+    from sim2real.prediction.kalman import gains
+    from sim2real.prediction.predictor import innovations
 
     gain, candidates = gains(flight, (0.5,))[0].with_start(), bank()
     rows, pushed = parameter_rows(flight, candidates), pushes(flight, candidates.terms)

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from icing_env import scenario
-from sim2real.any_course import PLACES, course_fits, with_courses
-from sim2real.candidates import bank
-from sim2real.courses import Course, Courses
-from sim2real.evidence import gather
-from sim2real.generic import UnknownFit
-from sim2real.predictor import Push
-from sim2real.reconstruct import reconstruct
+from sim2real.library.candidates import bank
+from sim2real.posterior.any_course import PLACES, course_fits, with_courses
+from sim2real.posterior.generic import UnknownFit
+from sim2real.prediction.predictor import Push
+from sim2real.records.reconstruct import reconstruct
+from sim2real.signatures.courses import Course, Courses
+from sim2real.signatures.evidence import gather
 from testbed.flight import fly
 
 NUISANCES = 4

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from icing_env import scenario
-from sim2real.candidates import bank
-from sim2real.courses import Course, Courses, Remainder
-from sim2real.evidence import Evidence, flown, gather
-from sim2real.predictor import Push
-from sim2real.reconstruct import reconstruct
+from sim2real.library.candidates import bank
+from sim2real.prediction.predictor import Push
+from sim2real.records.reconstruct import reconstruct
+from sim2real.signatures.courses import Course, Courses, Remainder
+from sim2real.signatures.evidence import Evidence, flown, gather
 from testbed.flight import fly
 
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import pytest
 
 from icing_env import effects
-from sim2real.candidates import FEW, NODES, at_few_sizes, bank
-from sim2real.devices import apart, together, within
-from sim2real.forgiveness import _in_company, _leaking, elsewhere
-from sim2real.form import Form, Liberty, energies
-from sim2real.generic import UnknownFit
-from sim2real.hypotheses import Hypothesis
-from sim2real.sets import SetFit
+from sim2real.library.candidates import FEW, NODES, at_few_sizes, bank
+from sim2real.posterior.devices import apart, together, within
+from sim2real.posterior.forgiveness import _in_company, _leaking, elsewhere
+from sim2real.posterior.form import Form, Liberty, energies
+from sim2real.posterior.generic import UnknownFit
+from sim2real.posterior.hypotheses import Hypothesis
+from sim2real.posterior.sets import SetFit
 
 WHOLE = bank()
 

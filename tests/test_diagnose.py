@@ -11,15 +11,15 @@ import pytest
 from icing_env import scenario
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, RecordMeta, write
-from sim2real import gap
-from sim2real.candidates import bank, nodes, nuisances, unbroken
-from sim2real.channels import FED_BACK
+from sim2real.actuators.timing import in_step
+from sim2real.closing import gap
 from sim2real.diagnosis import Diagnosis, credible, diagnose
-from sim2real.kalman import gains, linearise
-from sim2real.predictor import innovations
-from sim2real.reconstruct import reconstruct, unfiltered
-from sim2real.sizes import piece_prior, size_prior
-from sim2real.timing import in_step
+from sim2real.library.candidates import bank, nodes, nuisances, unbroken
+from sim2real.library.sizes import piece_prior, size_prior
+from sim2real.prediction.kalman import gains, linearise
+from sim2real.prediction.predictor import innovations
+from sim2real.records.channels import FED_BACK
+from sim2real.records.reconstruct import reconstruct, unfiltered
 from testbed.cli import _run
 from testbed.commands.diagnose import answer
 from testbed.flight import fly

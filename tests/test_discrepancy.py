@@ -13,16 +13,16 @@ from icing_env.effects.discrepancy import AT, CHANNELS, TERMS
 from icing_env.errors import InputError
 from icing_env.simulate import Fleet
 from icing_env.trim import trim
-from sim2real import gap
-from sim2real.candidates import bank
+from sim2real.closing import gap
+from sim2real.closing.discrepancy import choices, condition
+from sim2real.closing.remedy import Remedy
 from sim2real.diagnosis import diagnose
-from sim2real.discrepancy import choices, condition
-from sim2real.evidence import predicted
-from sim2real.kalman import gains
-from sim2real.predictor import innovations
-from sim2real.reconstruct import reconstruct
-from sim2real.remedy import Remedy
-from sim2real.terms import GENERIC, pushes
+from sim2real.library.candidates import bank
+from sim2real.library.terms import GENERIC, pushes
+from sim2real.prediction.kalman import gains
+from sim2real.prediction.predictor import innovations
+from sim2real.records.reconstruct import reconstruct
+from sim2real.signatures.evidence import predicted
 from testbed.flight import fly
 
 AIRCRAFT = changed(load(), Cm_elevator_CT=0.0)  # power would change what a term of the elevator does

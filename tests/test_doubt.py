@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim2real.candidates import bank
-from sim2real.companions import CERTAIN
-from sim2real.forgiveness import ELSEWHERE, _leaking, elsewhere
-from sim2real.generic import UnknownFit
-from sim2real.hypotheses import DOUBT, MOST_DOUBT, Hypothesis, Posterior, doubt, doubted, normalised
-from sim2real.sets import SetFit
-from sim2real.varying import varying
+from sim2real.flown.companions import CERTAIN
+from sim2real.library.candidates import bank
+from sim2real.over_time.varying import varying
+from sim2real.posterior.forgiveness import ELSEWHERE, _leaking, elsewhere
+from sim2real.posterior.generic import UnknownFit
+from sim2real.posterior.hypotheses import DOUBT, MOST_DOUBT, Hypothesis, Posterior, doubt, doubted, normalised
+from sim2real.posterior.sets import SetFit
 
 SOMETHING = UnknownFit("x_force", 0.0, (("1", 1.0, 0.1),), 0.0, {})
 

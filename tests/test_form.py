@@ -8,10 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from icing_env import effects
-from sim2real.bends import bends, natural
-from sim2real.candidates import bank
-from sim2real.devices import within
-from sim2real.form import (
+from sim2real.library.bends import bends, natural
+from sim2real.library.candidates import bank
+from sim2real.library.terms import BEYOND, GENERIC, unit_of
+from sim2real.posterior.devices import within
+from sim2real.posterior.form import (
     ALIKE,
     DIRECTIONS,
     FORGIVEN,
@@ -24,13 +25,12 @@ from sim2real.form import (
     own_terms,
     with_terms,
 )
-from sim2real.generic import UnknownFit, fit_unknown
-from sim2real.home_terms import gain, without
-from sim2real.home_terms import given as after_terms
-from sim2real.hypotheses import Hypothesis, is_home, set_prior
-from sim2real.likeness import calibration, foreign, is_own
-from sim2real.sets import SetFit
-from sim2real.terms import BEYOND, GENERIC, unit_of
+from sim2real.posterior.generic import UnknownFit, fit_unknown
+from sim2real.posterior.home_terms import gain, without
+from sim2real.posterior.home_terms import given as after_terms
+from sim2real.posterior.hypotheses import Hypothesis, is_home, set_prior
+from sim2real.posterior.likeness import calibration, foreign, is_own
+from sim2real.posterior.sets import SetFit
 
 TERMS = 6
 

@@ -11,16 +11,16 @@ import pytest
 
 from icing_env import effects, scenario
 from icing_env.record import FlightRecord
-from sim2real.by_stretch import BY_RECORD, SHARED, cut_up, random_walk, responses, ways_of
-from sim2real.candidates import bank
-from sim2real.channels import MEASURED
 from sim2real.diagnosis import Diagnosis, diagnose
-from sim2real.evidence import gather
-from sim2real.hypotheses import Hypothesis
-from sim2real.predictor import Predictor, held
-from sim2real.reconstruct import reconstruct
-from sim2real.sets import SetFit
-from sim2real.varying import _or_any
+from sim2real.library.candidates import bank
+from sim2real.over_time.by_stretch import BY_RECORD, SHARED, cut_up, random_walk, responses, ways_of
+from sim2real.over_time.varying import _or_any
+from sim2real.posterior.hypotheses import Hypothesis
+from sim2real.posterior.sets import SetFit
+from sim2real.prediction.predictor import Predictor, held
+from sim2real.records.channels import MEASURED
+from sim2real.records.reconstruct import reconstruct
+from sim2real.signatures.evidence import gather
 from sim2real.where import _variable
 from sim2real.words import sentences
 from testbed.flight import fly

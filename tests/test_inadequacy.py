@@ -10,15 +10,15 @@ import pytest
 
 from icing_env.aircraft import load
 from icing_env.record import read
-from sim2real.candidates import bank
-from sim2real.channels import MEASURED
+from sim2real.baseline.inadequacy import colour
+from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import _reconstructed, diagnose
-from sim2real.evidence import SETTLE, gather
-from sim2real.generic import fit_unknown
-from sim2real.inadequacy import colour
-from sim2real.means import without_means
-from sim2real.reconstruct import Inadequacy
-from sim2real.references import Baseline
+from sim2real.library.candidates import bank
+from sim2real.posterior.generic import fit_unknown
+from sim2real.records.channels import MEASURED
+from sim2real.records.reconstruct import Inadequacy
+from sim2real.signatures.evidence import SETTLE, gather
+from sim2real.signatures.means import without_means
 from sim2real.words import of_the_model
 from testbed.withheld.draw import published_spread
 from testbed.withheld.files import record_text, side_text

@@ -14,8 +14,8 @@ from icing_env import scenario
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord
 from sim2real.diagnosis import diagnose
-from sim2real.instruments import UNFILTERED, lateness, recorder_lags, with_recorder
-from sim2real.reconstruct import reconstruct
+from sim2real.records.instruments import UNFILTERED, lateness, recorder_lags, with_recorder
+from sim2real.records.reconstruct import reconstruct
 from testbed.flight import fly
 
 FILE = lateness(1.0 / (2.0 * np.pi * 10.0), 0.02)
@@ -61,7 +61,7 @@ def test_a_recorder_is_found_only_where_it_is_not_the_files() -> None:
                                              ([(0.0006, 0.0005), (0.0002, 0.0009)], True)])
 def test_pitch_and_roll_have_one_recorder(lags, found, monkeypatch) -> None:
     """Where they contradict one another, neither is believed: a sharp error is sharp by luck."""
-    monkeypatch.setattr("sim2real.instruments.recorder_lags", lambda records: lags)
+    monkeypatch.setattr("sim2real.records.instruments.recorder_lags", lambda records: lags)
     assert ("filter" in with_recorder([flown()])[0].meta.sensors) == found
 
 

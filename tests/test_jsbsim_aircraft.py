@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from icing_env.record import read
-from sim2real.candidates import bank
-from sim2real.reconstruct import reconstruct
-from sim2real.references import fit_baseline
+from sim2real.baseline.references import fit_baseline
+from sim2real.library.candidates import bank
+from sim2real.records.reconstruct import reconstruct
 from testbed import cli
 from testbed.withheld import instruments
 from testbed.withheld import plant as pl

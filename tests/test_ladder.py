@@ -9,11 +9,11 @@ from icing_env import scenario
 from icing_env.aircraft import load
 from icing_env.effects import with_effects
 from icing_env.record import FlightRecord
-from sim2real import black_box, gap
+from sim2real.actuators.paths import driven, follow
+from sim2real.closing import black_box, gap
+from sim2real.closing.remedy import Remedy
 from sim2real.diagnosis import Diagnosis, diagnose
-from sim2real.paths import driven, follow
-from sim2real.reconstruct import reconstruct
-from sim2real.remedy import Remedy
+from sim2real.records.reconstruct import reconstruct
 from testbed.flight import fly
 
 

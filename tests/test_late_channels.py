@@ -10,7 +10,7 @@ import pytest
 from estimators.signals.data_checks import check
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, read
-from sim2real.reconstruct import reconstruct
+from sim2real.records.reconstruct import reconstruct
 from testbed.withheld import files, flights, manoeuvres
 
 

@@ -12,20 +12,20 @@ from hypothesis import strategies as st
 from icing_env import effects, scenario
 from icing_env.aircraft import load
 from icing_env.types import DERIVATIVE_NAMES
-from sim2real.bends import bends, changes
-from sim2real.candidates import bank
-from sim2real.channels import MEASURED
-from sim2real.courses import Course, Courses, projected
-from sim2real.evidence import gather
-from sim2real.generic import fit_unknown
-from sim2real.home_terms import gain
-from sim2real.other_form import Bent, bring, flown_unknown
-from sim2real.points import Flying
-from sim2real.reconstruct import Reconstruction, reconstruct
-from sim2real.references import Baseline
-from sim2real.sets import SetFit
-from sim2real.steps import FARTHEST, bounded_step
-from sim2real.terms import BEYOND, GENERIC, Term, _values, in_common, pushes
+from sim2real.baseline.references import Baseline
+from sim2real.flown.other_form import Bent, bring, flown_unknown
+from sim2real.flown.points import Flying
+from sim2real.flown.steps import FARTHEST, bounded_step
+from sim2real.library.bends import bends, changes
+from sim2real.library.candidates import bank
+from sim2real.library.terms import BEYOND, GENERIC, Term, _values, in_common, pushes
+from sim2real.posterior.generic import fit_unknown
+from sim2real.posterior.home_terms import gain
+from sim2real.posterior.sets import SetFit
+from sim2real.records.channels import MEASURED
+from sim2real.records.reconstruct import Reconstruction, reconstruct
+from sim2real.signatures.courses import Course, Courses, projected
+from sim2real.signatures.evidence import gather
 from testbed.flight import fly
 
 

@@ -13,11 +13,11 @@ from icing_env.record import COLUMNS, FlightRecord, RecordMeta
 from icing_env.simulate import Fleet
 from icing_env.trim import trim
 from icing_env.types import MEASUREMENT_FIELDS
-from sim2real.candidates import SPREAD
 from sim2real.diagnosis import diagnose
-from sim2real.plan import ALTITUDE, GUSTS, plan
-from sim2real.planned import named, planned, template
-from sim2real.singles import DETECTABLE
+from sim2real.library.candidates import SPREAD
+from sim2real.planning.plan import ALTITUDE, GUSTS, plan
+from sim2real.planning.planned import named, planned, template
+from sim2real.posterior.singles import DETECTABLE
 from testbed.cli import _run
 
 ELEVATOR, LATERAL = "elevator doublets at 55 m/s", "aileron and rudder doublets at 60 m/s"

@@ -12,17 +12,17 @@ from hypothesis import strategies as st
 
 from icing_env import scenario
 from icing_env.aircraft import load
-from sim2real.candidates import bank
-from sim2real.corrections import corrected, lost
-from sim2real.courses import Course, Courses
-from sim2real.evidence import gather
-from sim2real.hypotheses import Hypothesis
-from sim2real.points import Flying
-from sim2real.reconstruct import reconstruct
-from sim2real.references import Baseline
-from sim2real.sets import SetFit
-from sim2real.steps import Point, bounded_step, rooms
-from sim2real.terms import in_common, pushes
+from sim2real.baseline.references import Baseline
+from sim2real.flown.corrections import corrected, lost
+from sim2real.flown.points import Flying
+from sim2real.flown.steps import Point, bounded_step, rooms
+from sim2real.library.candidates import bank
+from sim2real.library.terms import in_common, pushes
+from sim2real.posterior.hypotheses import Hypothesis
+from sim2real.posterior.sets import SetFit
+from sim2real.records.reconstruct import reconstruct
+from sim2real.signatures.courses import Course, Courses
+from sim2real.signatures.evidence import gather
 from testbed.flight import fly
 
 NOTHING = SetFit(misfit=1e6)

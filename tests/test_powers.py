@@ -8,11 +8,11 @@ import pytest
 
 from icing_env import aircraft, scenario
 from icing_env.record import FlightRecord
-from sim2real.candidates import bank, not_testable
-from sim2real.channels import MEASURED
 from sim2real.diagnosis import diagnose
-from sim2real.powers import powers
-from sim2real.reconstruct import reconstruct
+from sim2real.library.candidates import bank, not_testable
+from sim2real.records.channels import MEASURED
+from sim2real.records.powers import powers
+from sim2real.records.reconstruct import reconstruct
 from testbed.flight import fly
 
 ENGINES = ("thrust", "torque", "rpm")

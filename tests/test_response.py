@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from icing_env import scenario
-from sim2real.candidates import bank
-from sim2real.evidence import Evidence, flown, gather
-from sim2real.predictor import Push
-from sim2real.reconstruct import reconstruct
-from sim2real.response import Filter
-from sim2real.terms import at_any_time, pushes
+from sim2real.library.candidates import bank
+from sim2real.library.terms import at_any_time, pushes
+from sim2real.prediction.predictor import Push
+from sim2real.records.reconstruct import reconstruct
+from sim2real.signatures.evidence import Evidence, flown, gather
+from sim2real.signatures.response import Filter
 from testbed.flight import fly
 
 

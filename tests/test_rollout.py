@@ -16,11 +16,11 @@ from icing_env.errors import InputError
 from icing_env.record import FlightRecord, write
 from icing_env.sensors import SENSOR_PARAMETERS
 from sim2real import rollout
+from sim2real.closing.missing_terms import missing_terms, residual_coefficients
 from sim2real.diagnosis import diagnose
-from sim2real.missing_terms import missing_terms, residual_coefficients
-from sim2real.predictor import Predictor, put
-from sim2real.reconstruct import reconstruct
-from sim2real.windows import COMPARED
+from sim2real.prediction.predictor import Predictor, put
+from sim2real.prediction.windows import COMPARED
+from sim2real.records.reconstruct import reconstruct
 from testbed.cli import _run
 from testbed.flight import fly
 

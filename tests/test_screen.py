@@ -11,17 +11,17 @@ from hypothesis import strategies as st
 
 from icing_env import effects, scenario
 from icing_env.aircraft import load
-from sim2real.candidates import Family, bank, nodes
-from sim2real.companions import without
-from sim2real.courses import Course, Courses
-from sim2real.evidence import gather
-from sim2real.points import Flying
-from sim2real.predictor import LOST, with_spare
-from sim2real.reconstruct import Reconstruction, reconstruct
-from sim2real.references import Baseline
-from sim2real.sets import SetFit
-from sim2real.terms import in_common
-from sim2real.valleys import lowest
+from sim2real.baseline.references import Baseline
+from sim2real.flown.companions import without
+from sim2real.flown.points import Flying
+from sim2real.flown.valleys import lowest
+from sim2real.library.candidates import Family, bank, nodes
+from sim2real.library.terms import in_common
+from sim2real.posterior.sets import SetFit
+from sim2real.prediction.predictor import LOST, with_spare
+from sim2real.records.reconstruct import Reconstruction, reconstruct
+from sim2real.signatures.courses import Course, Courses
+from sim2real.signatures.evidence import gather
 from testbed.flight import fly
 
 WHOLE = bank()

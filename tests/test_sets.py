@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim2real.attribution import Linear, attribute, with_prior
-from sim2real.candidates import Bank, bank
-from sim2real.generic import beside
-from sim2real.hypotheses import Posterior
-from sim2real.sets import SetFit, descend, integrate, pairs, sizes_tried
-from sim2real.sizes import flown_weights, in_powers
+from sim2real.library.candidates import Bank, bank
+from sim2real.library.sizes import flown_weights, in_powers
+from sim2real.posterior.attribution import Linear, attribute, with_prior
+from sim2real.posterior.generic import beside
+from sim2real.posterior.hypotheses import Posterior
+from sim2real.posterior.sets import SetFit, descend, integrate, pairs, sizes_tried
 from sim2real.where import components
 
 SAMPLES = 900

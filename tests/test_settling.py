@@ -13,13 +13,13 @@ import pytest
 
 from icing_env.aircraft import load
 from icing_env.record import read
-from sim2real.candidates import bank
+from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import _reconstructed
-from sim2real.evidence import SIGMAS, choose_gain, likelihoods
-from sim2real.kalman import gains
-from sim2real.reconstruct import Reconstruction
-from sim2real.references import Baseline
-from sim2real.settling import likeliest, settle
+from sim2real.flown.settling import likeliest, settle
+from sim2real.library.candidates import bank
+from sim2real.prediction.kalman import gains
+from sim2real.records.reconstruct import Reconstruction
+from sim2real.signatures.evidence import SIGMAS, choose_gain, likelihoods
 from testbed.withheld.draw import SPREAD, published_spread
 from testbed.withheld.files import record_text, side_text
 from testbed.withheld.flights import Aircraft, recorded

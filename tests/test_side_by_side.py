@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from sim2real.side_by_side import algebra_in_one_thread, each, threads
+from sim2real.records.side_by_side import algebra_in_one_thread, each, threads
 
 
 @pytest.mark.parametrize("told", ["1", "3"])

@@ -9,10 +9,10 @@ import pytest
 
 from icing_env import scenario
 from icing_env.record import FloatArray
-from sim2real.channels import SURFACE_NOISE
-from sim2real.paths import UNFILTERED, follow, path_residuals
-from sim2real.reconstruct import Reconstruction, reconstruct
-from sim2real.surfaces import EXACT, PLACED, placed
+from sim2real.actuators.paths import UNFILTERED, follow, path_residuals
+from sim2real.actuators.surfaces import EXACT, PLACED, placed
+from sim2real.records.channels import SURFACE_NOISE
+from sim2real.records.reconstruct import Reconstruction, reconstruct
 from testbed.flight import fly
 
 NOISE = 5.2e-4  # rad

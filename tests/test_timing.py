@@ -8,10 +8,10 @@ import pytest
 
 from icing_env import effects, scenario
 from icing_env.record import FlightRecord
-from sim2real.channels import SURFACES
-from sim2real.paths import path_gram
-from sim2real.reconstruct import TIMING, Reconstruction, reconstruct
-from sim2real.timing import in_step
+from sim2real.actuators.paths import path_gram
+from sim2real.actuators.timing import in_step
+from sim2real.records.channels import SURFACES
+from sim2real.records.reconstruct import TIMING, Reconstruction, reconstruct
 from testbed.flight import fly
 
 CLEAR = 12.0  # whitened square that a lag has to explain before it is anything

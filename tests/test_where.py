@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from icing_env import scenario
-from sim2real.candidates import bank
-from sim2real.channels import MEASURED
-from sim2real.evidence import Evidence, gather
-from sim2real.reconstruct import reconstruct
+from sim2real.library.candidates import bank
+from sim2real.records.channels import MEASURED
+from sim2real.records.reconstruct import reconstruct
+from sim2real.signatures.evidence import Evidence, gather
 from sim2real.where import REGIME_VARIABLES, regimes, stretches
 from testbed.flight import fly
 

@@ -13,14 +13,14 @@ import pytest
 
 from icing_env.aircraft import load
 from icing_env.record import read
-from sim2real.channels import MEASURED
+from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import _reconstructed
-from sim2real.evidence import SETTLE, SIGMAS, choose_gain, whiten, whitening
-from sim2real.kalman import _within_steps, follow, gains, gust_noise, linearise
-from sim2real.noise import step_noise
-from sim2real.predictor import TANGENT, Predictor, innovations
-from sim2real.reconstruct import Reconstruction
-from sim2real.references import Baseline
+from sim2real.prediction.kalman import _within_steps, follow, gains, gust_noise, linearise
+from sim2real.prediction.predictor import TANGENT, Predictor, innovations
+from sim2real.records.channels import MEASURED
+from sim2real.records.noise import step_noise
+from sim2real.records.reconstruct import Reconstruction
+from sim2real.signatures.evidence import SETTLE, SIGMAS, choose_gain, whiten, whitening
 from testbed.withheld import instruments
 from testbed.withheld import plant as pl
 from testbed.withheld.files import record_text, side_text

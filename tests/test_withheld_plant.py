@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from icing_env import aircraft
 from icing_env import effects as library
 from icing_env.simulate import Fleet
-from sim2real.channels import TOLERANCE
+from sim2real.records.channels import TOLERANCE
 from testbed.withheld import effects, manoeuvres
 from testbed.withheld import plant as pl
 from testbed.withheld.flights import Aircraft, Flown, fly

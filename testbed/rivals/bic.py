@@ -15,11 +15,11 @@ from dataclasses import replace
 import numpy as np
 
 from icing_env.record import FlightRecord
-from sim2real.candidates import Bank, bank, not_testable, unbroken
-from sim2real.evidence import gather
-from sim2real.kalman import gains
-from sim2real.reconstruct import reconstruct
-from sim2real.singles import EffectFit, fit_family
+from sim2real.library.candidates import Bank, bank, not_testable, unbroken
+from sim2real.posterior.singles import EffectFit, fit_family
+from sim2real.prediction.kalman import gains
+from sim2real.records.reconstruct import reconstruct
+from sim2real.signatures.evidence import gather
 from testbed.rivals.opinion import Opinion, Scale, Size
 
 SCALE = Scale(level=10100.0, width=1.01, sharpness=5.67e-4, doubt=0.299)  # testbed.rivals.scales, 90 development cases

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from icing_env import effects
 from icing_env.effects import Parameter
 from icing_env.record import FloatArray
-from sim2real.channels import MEASURED, SURFACES
-from sim2real.paths import path_residuals
-from sim2real.predictor import Predictor, put
-from sim2real.reconstruct import Reconstruction
+from sim2real.actuators.paths import path_residuals
+from sim2real.prediction.predictor import Predictor, put
+from sim2real.prediction.windows import COMPARED, FREE, fly
+from sim2real.records.channels import MEASURED, SURFACES
+from sim2real.records.reconstruct import Reconstruction
 from sim2real.rollout import as_coefficients
-from sim2real.windows import COMPARED, FREE, fly
 
 HORIZON, APART, AVERAGED = 0.1, 0.2, 0.1  # s flown, between restarts, and over which the starts are averaged (assumed)
 NAMES = ("CX", "CY", "CZ", "Cl", "Cm", "Cn")

@@ -19,8 +19,8 @@ from estimators.estimate import Estimate
 from estimators.likelihood.output_error import identify
 from icing_env.record import FlightRecord, FloatArray
 from icing_env.types import DERIVATIVE_NAMES
-from sim2real.candidates import SPREAD
-from sim2real.reconstruct import Reconstruction, reconstruct
+from sim2real.library.candidates import SPREAD
+from sim2real.records.reconstruct import Reconstruction, reconstruct
 from testbed.rivals.coefficients import Lack, Variant, lack, parameter_rows, variants
 from testbed.rivals.opinion import Opinion, Scale, Size
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from estimators.regression.stepwise import stepwise
 from icing_env.record import FlightRecord, FloatArray
-from sim2real.reconstruct import reconstruct
+from sim2real.records.reconstruct import reconstruct
 from testbed.rivals.coefficients import Lack, lack, variants
 from testbed.rivals.opinion import Opinion, Scale, Size
 

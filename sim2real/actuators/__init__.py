@@ -1,0 +1,1 @@
+"""From command to position: when commands act, where surfaces were, what actuators and engines do."""

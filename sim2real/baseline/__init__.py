@@ -1,0 +1,1 @@
+"""What reference flights without the gap say of the model, and how well it is known then."""

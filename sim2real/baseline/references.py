@@ -1,0 +1,192 @@
+"""Flights of the same aircraft without the gap: they correct the model, and say how well it is known then.
+
+The model's numbers are fitted by Gauss-Newton, all flown anew at every step, each with a value and a change with the
+flight condition: an aircraft whose derivatives bend with angle of attack is met by lines through its test points. Their
+prior is that of the published model; where the flights contradict it a number's prior widens until they do not
+(automatic relevance: MacKay, Neural Computation 4(3), 1992), so that an aircraft far from the model is followed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icing_env import aircraft
+from icing_env.record import FlightRecord, FloatArray
+from sim2real.baseline.inadequacy import WALKS, clean, colour, walk
+from sim2real.library.candidates import NUISANCE_STEP, Bank, Nuisance
+from sim2real.records.reconstruct import Inadequacy, Reconstruction
+from sim2real.signatures.evidence import Evidence, gather
+from sim2real.signatures.tempering import temper
+
+ROUNDS, SETTLED = 10, 4.0  # flown steps, and the whitened length of one that ends them
+AGAIN = 2  # the round after which gust intensities are chosen anew at every step: what does not fit passes for gusts
+LONGEST = 40.0  # standard deviations that a step may move a number
+REFERENCE_SPEED = 65.0  # m/s, where a number has its value; it changes with (65/V)^2, as alpha does in level flight
+CHANGES = 1.0  # prior standard deviation of that change at twice the dynamic pressure, in that of the value (assumed)
+# What the published spread leaves alone and another aircraft may have: standard deviations (assumed)
+BEYOND: dict[str, float] = {
+    "CY_0": 1e-3, "Cl_0": 3e-4, "Cn_0": 3e-4, "Cl_alpha": 2e-3, "Cm_CT": 0.02, "CZ_CT": 0.02, "Cm_elevator_CT": 0.06,
+    "Cm_alphadot": 0.4, "engine_arm_z": 0.02, "thrust_factor_left+thrust_factor_right": 0.02, "CX_elevator": 5e-3,
+    "CZ_alpha2": 0.3, "Cm_alpha2": 0.1, "Cm_alpha_elevator": 0.1, "CY_alpha_beta": 0.1, "Cl_alpha_beta": 0.02,
+    "Cn_alpha_beta": 0.02}  # fmt: skip
+# a matter of each record and its recorder
+FIXED = ("mass", "thrust", "filter_frequency", "vane_lag", "pitot_lag", "boom_gain")
+REPEATABLE = 0.2  # standard deviations: no number is known better for another flight (assumed: 1 % of a derivative)
+LEAST = 1e-3  # of a published step: a number near zero has a nuisance that hardly moves it
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """The model a gap is looked for against: its PARAMETERS row and the precision of its nuisances [n, n].
+
+    `changes`: what is added to PARAMETERS per unit of (65 m/s / V)^2 - 1, by name; `inadequacy`: what is
+    left then; `clean`: what generic terms explain of the references all the same, log evidence by component.
+    """
+
+    parameters: NDArray
+    precision: FloatArray
+    changes: dict[str, float] = field(default_factory=dict)
+    inadequacy: Inadequacy = field(default_factory=Inadequacy)
+    clean: dict[str, float] = field(default_factory=dict)
+
+    def near(self, record: FlightRecord) -> NDArray:
+        """PARAMETERS row at the record's median airspeed."""
+        out = self.parameters.copy()
+        if self.changes:
+            condition = _condition(float(np.nanmedian(record["airspeed"])))
+            for name, slope in self.changes.items():
+                out[name] += condition * slope
+        return out
+
+    def answer(self) -> dict[str, Any]:
+        """What references say of the model with its numbers at their best, for machines."""
+        return {**asdict(self.inadequacy), "explained_without_a_gap": {c: v for c, v in self.clean.items() if v > 0.0}}
+
+
+def _condition(airspeed: float) -> float:
+    return (REFERENCE_SPEED / airspeed) ** 2 - 1.0
+
+
+def _first(nuisance: Nuisance) -> str:
+    return nuisance.parameter.split("+")[0]
+
+
+def directions(candidates: Bank) -> tuple[Nuisance, ...]:
+    """What is fitted: the candidates' nuisances in steps of the published numbers' size, then those of BEYOND."""
+    row = aircraft.load()[0]
+    out = []
+    for nuisance in candidates.nuisances:
+        size = nuisance.factor * (1.0 if nuisance.absolute else abs(float(row[_first(nuisance)])))
+        out.append(replace(nuisance, factor=size, absolute=True, only="nowhere" if nuisance.name in FIXED else ""))
+    return (*out, *(Nuisance(name, name, size, True) for name, size in BEYOND.items()))
+
+
+def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank) -> Baseline:
+    """The model corrected by reference flights, and the precision with which they leave it."""
+    fit = _Fit(flights, directions(candidates))
+    for k in range(ROUNDS):
+        settled = fit.step(again=k > AGAIN) < SETTLED
+        if k == AGAIN or (k > AGAIN and settled):
+            last, fit.walk = fit.walk, walk(fit.flown())
+            if k > AGAIN and fit.walk == last:
+                break
+    return fit.baseline(candidates)
+
+
+class _Fit:
+    """Values and changes of the numbers `moves`, fitted to `flights`.
+
+    x: the numbers' values, then their changes [2 n], in `moves`' units; walk: of `Inadequacy`.
+    """
+
+    def __init__(self, flights: Sequence[Reconstruction], moves: Sequence[Nuisance]) -> None:
+        n = len(moves)
+        self.flights, self.moves = flights, moves
+        self.at = np.array([_condition(float(np.median(f.channel("airspeed")))) for f in flights])
+        self.bank = Bank(tuple(moves), (), (), 1 + n)
+        self.x, self.spread = np.zeros(2 * n), np.concatenate([np.ones(n), np.full(n, CHANGES)])
+        self.walk = WALKS[-1]  # while the model may still be far off
+        self.precision = np.zeros((0, 0))
+        self.evidences: list[Evidence] = []
+
+    def flown(self) -> list[Reconstruction]:
+        """The flights over the model as fitted so far."""
+        n, out = len(self.moves), []
+        for flight, condition in zip(self.flights, self.at, strict=True):
+            row = flight.parameters.copy()
+            for nuisance, size in zip(self.moves, self.x[:n] + condition * self.x[n:], strict=True):
+                nuisance.apply(row, 0, flight.power_from, float(size))
+            out.append(replace(flight, parameters=_possible(row), inadequacy=Inadequacy(self.walk)))
+        return out
+
+    def step(self, again: bool) -> float:
+        """One step of x; its whitened length.
+
+        Args:
+            again: whether gust intensities are chosen anew.
+        """
+        gains = [None] * len(self.flights) if again or not self.evidences else [e.gain for e in self.evidences]
+        self.evidences = [gather(f, self.bank, gain) for f, gain in zip(self.flown(), gains, strict=True)]
+        information, slope, tempering = _normal(self.evidences, self.at)
+        prior = np.diag(1.0 / np.maximum(self.spread, np.abs(self.x)) ** 2)
+        self.precision = information / tempering + prior
+        step = -np.linalg.solve(self.precision, slope / tempering + prior @ self.x)
+        self.x = self.x + step * min(1.0, LONGEST / max(float(np.max(np.abs(step))), LONGEST))
+        return float(np.sqrt(step @ self.precision @ step))
+
+    def baseline(self, candidates: Bank) -> Baseline:
+        """What was fitted, and how well it flies."""
+        found = _baseline(candidates, self.moves, self.x, self.precision, float(np.mean(self.at)))
+        left = Inadequacy(self.walk, *colour(self.evidences))
+        flown = [replace(flight, inadequacy=left) for flight in self.flown()]
+        told = clean(flown, [e.gain for e in self.evidences], candidates, found.precision)
+        return replace(found, inadequacy=left, clean=told)
+
+
+def _possible(row: NDArray) -> NDArray:
+    """No negative lags."""
+    for name in ("elevator_lag", "aileron_lag", "rudder_lag", "vane_lag"):
+        row[name] = np.maximum(row[name], 1e-3)
+    return row
+
+
+def _normal(evidences: Sequence[Evidence], at: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Information and slope of values and changes together [2 n], and what to divide them by (see tempering.temper)."""
+    n = len(evidences[0].gram) - 1
+    information, slope, misfit = np.zeros((2 * n, 2 * n)), np.zeros(2 * n), 0.0
+    for evidence, condition in zip(evidences, at, strict=True):
+        both = np.vstack([np.eye(n), condition * np.eye(n)]) / NUISANCE_STEP
+        information += both @ evidence.gram[1:, 1:] @ both.T
+        slope += both @ evidence.gram[1:, 0]
+        misfit += evidence.gram[0, 0]
+    gain = float(slope @ np.linalg.lstsq(information, slope, rcond=1e-9)[0])
+    return information, slope, temper(max(misfit - gain, 0.0), evidences)
+
+
+def _baseline(candidates: Bank, moves: Sequence[Nuisance], x: FloatArray, precision: FloatArray,
+              middle: float) -> Baseline:
+    """The fitted model; its nuisances' precision in their own units, the rest integrated out."""
+    n, count = len(moves), len(candidates.nuisances)
+    row, changes = aircraft.load(), dict[str, float]()
+    for nuisance, size, change in zip(moves, x[:n], x[n:], strict=True):
+        if not nuisance.only:
+            nuisance.apply(row, 0, "", float(size))
+            changes |= {name: float(change) * nuisance.factor for name in nuisance.parameter.split("+")}
+    both = np.vstack([np.eye(n), middle * np.eye(n)])
+    covariance = (both.T @ np.linalg.inv(precision) @ both)[:count, :count]
+    unit = np.ones(count)
+    for j, (nuisance, move) in enumerate(zip(candidates.nuisances, moves, strict=False)):
+        if not nuisance.absolute:
+            now = abs(float(row[_first(nuisance)][0])) * nuisance.factor
+            unit[j] = max(now / move.factor, LEAST)
+    out = np.linalg.inv(covariance / unit[:, None] / unit + REPEATABLE**2 * np.eye(count))
+    for j, nuisance in enumerate(candidates.nuisances):
+        if nuisance.name in FIXED:
+            out[j], out[:, j] = 0.0, 0.0
+            out[j, j] = 1.0
+    return Baseline(_possible(row), 0.5 * (out + out.T), changes)

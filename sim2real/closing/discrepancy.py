@@ -1,0 +1,283 @@
+"""What the library lacks, as an aircraft that can be flown: the effect `discrepancy`, its terms chosen and fitted.
+
+The generic terms of the component that a diagnosis points to are flown by the plant itself, in coefficients, so that
+dynamic pressure, inertia and instruments act on them as on any effect; nuisances give way. Terms are chosen forward and
+backward (modified stepwise regression, Klein & Morelli, Aircraft System Identification, AIAA 2006, section 5.4) by
+predicted squared error. In whitened units the noise is 1, and one term costs SHOWN^2: it earns its place where it alone
+would count as shown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icing_env import effects
+from icing_env.record import FloatArray
+from sim2real.baseline.references import Baseline
+from sim2real.flown.settling import nearer
+from sim2real.library.candidates import Bank, Nuisance, shifted
+from sim2real.library.terms import DEVIATION, FROM_ZERO, GENERIC, GENERIC_SIZE, unit_of
+from sim2real.posterior.attribution import nuisance_mean, reduce, with_prior
+from sim2real.posterior.form import WORTH
+from sim2real.posterior.hypotheses import Hypothesis, Posterior
+from sim2real.posterior.sets import SetFit
+from sim2real.posterior.singles import DETECTABLE
+from sim2real.records.channels import SURFACES, TOLERANCE
+from sim2real.records.reconstruct import Reconstruction
+from sim2real.signatures.evidence import Evidence, compare
+
+SHOWN = DETECTABLE  # standard errors that a term has to stand out
+ROUNDS, SETTLED = 8, 0.5  # of fitting at most, each flying the aircraft described so far; whitened square worth one
+RIDGE = 0.1  # prior precision of a term in its own unit (assumed: a standard deviation of three)
+LATE = ("_dot", "acceleration", "slow_phi", "slow_theta", "slow_ax", "slow_ay")  # terms with a memory
+SCALE, DELAY = 0.1, 0.1  # unit of a channel's scale error, and s of its delay
+COEFFICIENT = {"x_force": "CX", "y_force": "CY", "z_force": "CZ", "rolling_moment": "Cl", "pitching_moment": "Cm",
+               "yawing_moment": "Cn"}  # fmt: skip
+ABOUT = ("alpha", "elevator", "airspeed")  # quantities whose deviations from the records' medians are terms
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One term: its name among the generic ones, its number of the effect, and what counts as one unit of it."""
+
+    term: str
+    number: str
+    size: float
+
+
+@dataclass(frozen=True)
+class Description:
+    """An unknown in terms, most of which can be flown (no values where they cannot).
+
+    Attributes:
+        component: where it enters.
+        terms: (name, size, standard error) of those that earned their place, the surest first.
+        values: of the effect `discrepancy`.
+        covariance: of the sizes of `terms`.
+    """
+
+    component: str
+    terms: tuple[tuple[str, float, float], ...]
+    values: dict[str, float]
+    covariance: FloatArray
+
+    @property
+    def kind(self) -> str:
+        """static, dynamic (a delay) or time_varying, by the surest term that is not constant."""
+        leading = next((name for name, _, _ in self.terms if name != "1"), "1")
+        return "time_varying" if leading == "time" else "dynamic" if leading.endswith(LATE) else "static"
+
+    def answer(self) -> dict[str, Any]:
+        """As the interface has it."""
+        return {"component": self.component, "kind": self.kind,
+                "terms": [{"term": name, "coefficient": size, "std_error": error} for name, size, error in self.terms]}
+
+
+def choices(component: str, flights: Sequence[Reconstruction]) -> list[Choice]:
+    """The generic terms of a component as numbers of the effect, each with its unit."""
+    names = next(terms for where, _, terms in GENERIC if where == component)
+    half = 0.5 * _mean([f.time[-1] for f in flights])
+    if component.startswith("sensor:"):
+        channel = component.removeprefix("sensor:")
+        units = {"1": ("bias", TOLERANCE[channel]), channel: ("scale", SCALE), f"{channel}_dot": ("delay", DELAY),
+                 "time": ("drift", TOLERANCE[channel] / half)}  # fmt: skip
+        return [Choice(name, f"{units[name][0]}_{channel}", units[name][1]) for name in names]
+    p = flights[0].parameters[0]
+    slow = 2.0 * _mean([float(np.median(f.channel("airspeed"))) for f in flights])
+    per_rate = {"p": slow / p["span"], "q": slow / p["chord"], "r": slow / p["span"], "time": 1.0 / half}
+    target = next(target for where, target, _ in GENERIC if where == component)
+    out = []
+    for name in names:
+        size = GENERIC_SIZE[target]
+        for factor in name.split("*"):
+            size *= per_rate.get(factor, 1.0) / DEVIATION.get(factor, 1.0)
+        number = f"{COEFFICIENT[component]}_{'0' if name == '1' else name.replace('*', '_')}"
+        out.append(Choice(name, number, float(size)))
+    return out
+
+
+def condition(component: str, flights: Sequence[Reconstruction]) -> dict[str, float]:
+    """The condition that deviations are counted from: medians of the records, the middle of their time."""
+    at = {"at_time": 0.5 * _mean([f.time[-1] for f in flights])}
+    if component.startswith("sensor:"):
+        channel = component.removeprefix("sensor:")
+        quantities: tuple[str, ...] = () if channel in FROM_ZERO else (channel,)
+    else:
+        quantities = ABOUT
+    for name in quantities:
+        of = [f.controls[name] if name in SURFACES else f.altitude if name == "altitude" else f.channel(name)
+              for f in flights]  # fmt: skip
+        at[f"at_{name}"] = _mean([float(np.median(values)) for values in of])
+    return at
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values))
+
+
+def described(posterior: Posterior) -> Hypothesis | None:
+    """The most probable explanation that holds something unknown, where that is not improbable."""
+    if posterior.unknown < 0.05:
+        return None
+    return next((h for h in posterior.hypotheses if h.unknown is not None), None)
+
+
+def in_other_form(explained: Hypothesis) -> Hypothesis | None:
+    """Known effects with generic terms at home as what is to be described, where these say much that they do not."""
+    own = None if explained.form is None or explained.unknown is not None else explained.form.own
+    return None if own is None or own.log_evidence < WORTH else replace(explained, unknown=own)
+
+
+def describe_unknown(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence],
+                     baseline: Baseline, tempering: float, hypothesis: Hypothesis) -> Description:
+    """Choose and fit the terms of a hypothesis' unknown, its known effects at their sizes.
+
+    Args:
+        flights: the diagnosed records about the baseline.
+        evidences: theirs, for gains, whitening, and where the model has been moved to.
+        tempering: of the evidence.
+        hypothesis: one that holds something unknown.
+    """
+    assert hypothesis.unknown is not None
+    component = hypothesis.unknown.component
+    flyable = {name for where, _, names in GENERIC if where == component for name in names}
+    surest = max(hypothesis.unknown.terms, key=lambda term: abs(term[1]) / term[2])
+    if surest[0] not in flyable:
+        return _told(component, hypothesis.unknown.terms, flights[0].reach)
+    terms, at = choices(component, flights), condition(component, flights)
+    kept, only = _others(component, candidates)
+    precision = baseline.precision[np.ix_(kept, kept)]
+    centre = moved_by(flights[0], evidences[0].flight.parameters, only.nuisances)
+    first, n = 1 + len(only.nuisances), len(terms)
+    x, best, chosen, covariance = np.zeros(n), np.inf, np.zeros(n, bool), np.zeros((0, 0))
+    step, turn = x, centre
+    for _ in range(ROUNDS):
+        gram = np.zeros((first + n, first + n))
+        for flight, evidence in zip(flights, evidences, strict=True):
+            rows = _rows(flight, only, hypothesis.fit, terms, at, x + step, turn)
+            gram += compare(flight, rows, evidence.gain, evidence.factor).gram
+        gram = with_prior(gram / tempering, only, precision, turn)
+        reduced = reduce(gram, only, np.zeros_like(precision))
+        cost = float(reduced[0, 0])
+        if cost > best and np.any(step):  # too far: half the way from where it was better
+            step, turn = 0.5 * step, 0.5 * (turn + centre)
+            continue
+        gained = best - cost
+        x, best, centre = x + step, cost, turn
+        target, chosen, covariance = choose(reduced, first, x)
+        step = target - x
+        weights = {first + j: float(step[j]) for j in range(n)}
+        turn = nearer(centre + nuisance_mean(gram, only, weights), only)
+        if gained < SETTLED:
+            break
+    return _written(component, terms, at, x + step, chosen, covariance)
+
+
+def _told(component: str, terms: Sequence[tuple[str, float, float]], reach: Mapping[str, float]) -> Description:
+    """Terms that the effect cannot fly, as the evidence has them: those that stand out, the surest first."""
+    order = sorted(terms, key=lambda term: -abs(term[1]) / term[2])
+    kept = [term for term in order if abs(term[1]) > SHOWN * term[2]] or order[:1]
+    units = [unit_of(name, component, reach) for name, _, _ in kept]
+    told = tuple((name, size * unit, error * unit) for (name, size, error), unit in zip(kept, units, strict=True))
+    return Description(component, told, {}, np.diag([error**2 for _, _, error in told]))
+
+
+def _others(component: str, candidates: Bank) -> tuple[list[int], Bank]:
+    """Nuisances beside the component's own derivatives: which they are, and a bank of nothing else.
+
+    The derivatives of the component described are terms of the description: left to the nuisances, part of the gap
+    would be in neither of the two aircraft that are compared.
+    """
+    own = COEFFICIENT.get(component, "sensor") + "_"
+    kept = [j for j, nuisance in enumerate(candidates.nuisances) if not nuisance.parameter.startswith(own)]
+    nuisances = tuple(candidates.nuisances[j] for j in kept)
+    return kept, replace(candidates, nuisances=nuisances, families=(), terms=(), size=1 + len(nuisances))
+
+
+def moved_by(flight: Reconstruction, moved: NDArray, directions: Sequence[Nuisance]) -> FloatArray:
+    """Standard deviations [n] by which the model of a record has been moved in each nuisance direction."""
+    out = np.zeros(len(directions))
+    for j, nuisance in enumerate(directions):
+        if nuisance.only and nuisance.only != flight.power_from:
+            continue
+        name = nuisance.parameter.split("+")[0]
+        before, after = float(flight.parameters[name][0]), float(moved[name][0])
+        if nuisance.absolute:
+            out[j] = (after - before) / nuisance.factor
+        elif before != 0.0:
+            out[j] = (after / before - 1.0) / nuisance.factor
+    return out
+
+
+def _rows(flight: Reconstruction, only: Bank, known: SetFit, terms: Sequence[Choice], at: dict[str, float],
+          x: FloatArray, centre: FloatArray) -> NDArray:
+    """PARAMETERS: the model with the set and the terms `x` in it, a step of each nuisance, a unit of each term."""
+    first = 1 + len(only.nuisances)
+    base = shifted(flight.parameters, only.nuisances, centre, flight.power_from)
+    rows = np.repeat(base, first + len(terms))
+    for j, nuisance in enumerate(only.nuisances, start=1):
+        nuisance.apply(rows, j, flight.power_from)
+    sizes = np.tile(x, (len(rows), 1))
+    sizes[first:] += np.eye(len(terms))
+    values: dict[str, dict[str, float | NDArray]] = {name: {**own} for name, own in known.values.items()}
+    values["discrepancy"] = {**{t.number: sizes[:, j] * t.size for j, t in enumerate(terms)}, **at}
+    return effects.with_effects(rows, values)
+
+
+def choose(reduced: FloatArray, first: int, x: FloatArray) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:
+    """Stepwise choice among terms, from inner products whose row 0 is the residual with terms `x` in it.
+
+    Returns:
+        Sizes of all terms (zero where not chosen), which were chosen, and the covariance of those.
+    """
+    n = len(x)
+    terms = np.arange(first, first + n)
+    T = reduced[np.ix_(terms, terms)] + RIDGE * np.eye(n)
+    t = reduced[np.ix_(terms, terms)] @ x - reduced[terms, 0]
+    model: list[int] = []
+
+    def gain(subset: list[int]) -> float:
+        """Fall of the whitened square, less what the terms cost."""
+        if not subset:
+            return 0.0
+        block = T[np.ix_(subset, subset)]
+        return float(t[subset] @ np.linalg.solve(block, t[subset])) - SHOWN**2 * len(subset)
+
+    for _ in range(2 * n):
+        tried = [sorted({*model} ^ {j}) for j in range(n)]  # one more, or one less
+        best = max(tried, key=gain)
+        if gain(best) <= gain(model) and model:
+            break
+        model = best if best else model
+    sizes, chosen = np.zeros(n), np.zeros(n, bool)
+    covariance: FloatArray = np.asarray(np.linalg.inv(T[np.ix_(model, model)]), np.float64)
+    sizes[model], chosen[model] = covariance @ t[model], True
+    return sizes, chosen, covariance
+
+
+def _written(component: str, terms: Sequence[Choice], at: dict[str, float], x: FloatArray,
+             chosen: NDArray[np.bool_], covariance: FloatArray) -> Description:
+    """The chosen terms in their own units, the surest first."""
+    kept = [t for t, c in zip(terms, chosen, strict=True) if c]
+    unit = np.array([t.size for t in kept])
+    size, error = x[chosen] * unit, np.sqrt(np.diag(covariance)) * unit
+    order = np.argsort(-np.abs(size) / error)
+    told = tuple((kept[i].term, float(size[i]), float(error[i])) for i in order)
+    values = {kept[i].number: float(size[i]) for i in order}
+    return Description(component, told, values | _needed(values, at),
+                       (covariance * np.outer(unit, unit))[np.ix_(order, order)])
+
+
+def _needed(values: dict[str, float], at: dict[str, float]) -> dict[str, float]:
+    """Of the condition, what the numbers count from."""
+    def uses(name: str) -> bool:
+        quantity = name.removeprefix("at_")
+        words = {"time": ("time", "drift")}.get(quantity, (quantity,))
+        return any(word in number.split("_") for number in values for word in words)
+
+    return {name: value for name, value in at.items() if uses(name)}

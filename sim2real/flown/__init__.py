@@ -1,0 +1,1 @@
+"""Leading explanations flown where they fit, and settled there: their slopes, other forms, companions."""

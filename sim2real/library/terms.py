@@ -1,0 +1,283 @@
+"""Generic discrepancies: what a force, a moment, a sensor or a path may do that no effect of the library does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from scipy.signal import bilinear, lfilter
+
+from icing_env.atmosphere import density
+from icing_env.record import FloatArray
+from sim2real.prediction.predictor import Push
+from sim2real.records.channels import MEASURED, SURFACES, TOLERANCE
+from sim2real.records.reconstruct import Reconstruction
+
+
+@dataclass(frozen=True)
+class Term:
+    """A generic discrepancy: `target` (force, moment or sensor component) with a time course made of the record."""
+
+    component: str
+    name: str
+    target: str
+    row: int
+
+
+# Generic discrepancies: component, what they act on, time courses ("1" constant, products of deviations, "time").
+GENERIC: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+    ("x_force", "u", ("1", "alpha", "alpha*alpha", "airspeed", "elevator", "time")),
+    ("z_force", "w", ("1", "alpha", "q", "elevator", "alpha*alpha", "airspeed", "time")),
+    ("pitching_moment", "q", ("1", "alpha", "q", "elevator", "alpha*alpha", "alpha*elevator", "airspeed", "time")),
+    ("y_force", "v", ("1", "beta", "p", "r", "rudder", "alpha*beta", "time")),
+    ("rolling_moment", "p", ("1", "beta", "p", "r", "aileron", "rudder", "alpha*beta", "time")),
+    ("yawing_moment", "r", ("1", "beta", "p", "r", "aileron", "rudder", "alpha*beta", "time")),
+    *((f"sensor:{c}", c, ("1", c, f"{c}_dot", "time")) for c in MEASURED[:8]),
+    *((f"sensor:{c}", c, ("1", c, "time")) for c in MEASURED[8:12]),
+)
+# Structural modes under an accelerometer: what rings at so many Hz, in phase and a quarter behind. Light transports
+# have their first bending modes there (assumed), and each covers its neighbourhood.
+MODES = tuple(f"{kind}:{hertz:g}" for hertz in (2.0, 3.0, 4.5) for kind in ("rings", "rings_late"))
+# Terms that the effect `discrepancy` cannot fly, and that show where a gap lies nevertheless: across axes, of higher
+# order, in the paths of surfaces (no lags: actuators have their own, and channels are in step to a few ms at best) and
+# in the engines.
+BEYOND: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+    ("x_force", "u", ("beta*beta", "rudder*rudder")),
+    ("z_force", "w", ("beta*beta", "alpha*alpha*alpha", "alpha_dot", "CT")),
+    ("pitching_moment", "q", ("beta*beta", "alpha*alpha*alpha", "elevator*elevator*elevator", "elevator*airspeed",
+                              "aileron", "p", "r", "q*q*q", "CT", "alpha*CT", "alpha_dot")),
+    ("y_force", "v", ("aileron", "alpha*p", "alpha*rudder", "beta*beta*beta", "airspeed", "beta_dot")),
+    ("rolling_moment", "p", ("alpha", "q", "alpha*p", "aileron*aileron*aileron", "aileron*airspeed",
+                              "beta*beta*beta", "p*p*p", "airspeed", "CT", "beta_dot")),
+    ("yawing_moment", "r", ("alpha", "q", "alpha*p", "alpha*aileron", "alpha*rudder", "beta*beta*beta",
+                            "rudder*rudder*rudder", "rudder*airspeed", "r*r*r", "airspeed", "CT", "alpha*CT", "beta*CT",
+                            "beta_dot")),
+    ("sensor:airspeed", "airspeed", ("alpha", "beta", "airspeed*airspeed", "CT")),
+    ("sensor:alpha", "alpha", ("airspeed", "q", "alpha*alpha", "CT")),
+    ("sensor:beta", "beta", ("alpha", "p", "r", "CT")),
+    ("sensor:p", "p", ("q", "r", "az")), ("sensor:q", "q", ("p", "r", "az")), ("sensor:r", "r", ("p", "q", "az")),
+    ("sensor:phi", "phi", ("theta", "slow_phi", "slow_ay")),
+    ("sensor:theta", "theta", ("phi", "slow_theta", "slow_ax")),
+    ("sensor:ax", "ax", ("q_dot", "alpha", "az")), ("sensor:ay", "ay", ("p_dot", "r_dot", "ax", "az", *MODES)),
+    ("sensor:az", "az", ("q", "q_dot", "ax", *MODES)),
+    *((f"{s}_path", f"{s}_path", ("1", "position", "acceleration", "inertia", "position*position*position",
+                                  "direction", "side", "airspeed", flow))
+      for s, flow in zip(SURFACES, ("alpha", "p", "beta"), strict=True)),
+    ("propulsion", "thrust", ("both", "both*airspeed", "left", "left*airspeed")),
+)  # fmt: skip
+# One standard deviation of a generic coefficient with a time course of unit size (assumed: a quarter of the change
+# that typical effects of the library make).
+GENERIC_SIZE = {"u": 0.008, "w": 0.03, "v": 0.01, "p": 0.002, "q": 0.015, "r": 0.002}
+PATH_SIZE = {"1": 0.5 * math.pi / 180.0, "position": 0.1, "acceleration": 0.0025, "inertia": 0.005,
+             "position*position*position": 0.1, "direction": 0.25 * math.pi / 180.0,
+             "side": 0.25 * math.pi / 180.0}  # rad, 1, s2, s2, 1, rad, rad (assumed)
+THRUST_SIZE = 0.1  # (assumed)
+DEVIATION = {"alpha": 0.05, "beta": 0.05, "q": 0.1, "p": 0.2, "r": 0.1, "elevator": 0.04, "aileron": 0.08,
+             "rudder": 0.05, "airspeed": 5.0, "CT": 0.015, "phi": 0.2, "theta": 0.1, "ax": 1.0, "ay": 1.0, "az": 2.0,
+             "p_dot": 1.0, "q_dot": 0.5, "r_dot": 0.3, "alpha_dot": 0.05, "beta_dot": 0.05,
+             }  # fmt: skip  # what counts as one unit of a regressor (assumed)
+FLOW_RATES, WASHED = ("alpha_dot", "beta_dot"), 0.1  # rates of the flow's angles, and s over which they are taken
+DAMPING = 0.15  # of a mode (assumed: a real one's is less, but its frequency is not the term's)
+FROM_ZERO = ("alpha", "beta", "p", "q", "r")  # channels whose scale counts from zero
+SECOND_ORDER = 0.1  # s, by which an actuator of second order smooths what it lacks in acceleration (assumed)
+ERECTION = 30.0  # s in which a vertical gyro follows a false vertical (assumed)
+KNOT, KNOT_AT = 1.0, "at:"  # s between the knots of a free course of time (assumed: manoeuvres are slower)
+
+
+def pushes(flight: Reconstruction, terms: Sequence[Term]) -> tuple[Push, ...]:
+    """The time courses of the generic terms along one record."""
+    scale = _scales(flight)
+    out: list[Push] = []
+    for term in terms:
+        if term.target == "thrust":
+            out += _thrust_pushes(flight, term)
+        elif term.component.startswith("sensor:"):
+            out.append(Push(term.row, term.target, _sensor_course(flight, term.name, term.target), True))
+        elif not term.target.endswith("_path"):
+            series = GENERIC_SIZE[term.target] * scale[term.target] * _course(flight, term.name, True)
+            out.append(Push(term.row, term.target, series, False))
+    return tuple(out)
+
+
+def at_any_time(flight: Reconstruction, component: str, first: int) -> list[Term]:
+    """Terms that together are a free course of time at a force, a moment, a sensor or the engines, for one record.
+
+    Args:
+        first: row of the first.
+    """
+    times = np.arange(0.0, flight.time[-1] - flight.time[0] + KNOT, KNOT)
+    target = next(target for where, target, _ in (*GENERIC, *BEYOND) if where == component)
+    kinds = ("both*", "left*") if component == "propulsion" else ("",)
+    return [Term(component, f"{kind}{KNOT_AT}{t:g}", target, first + i)
+            for i, (kind, t) in enumerate(product(kinds, times))]
+
+
+def _thrust_pushes(flight: Reconstruction, term: Term) -> list[Push]:
+    """A share of both engines' thrust or of the left one's: felt, and read where recorded."""
+    side, _, course = term.name.partition("*")
+    p, sides = flight.parameters[0], ("left", "right") if side == "both" else ("left",)
+    speed = flight.channel("airspeed")
+    per_power = p["propeller_efficiency"] / np.sqrt(speed**2 + p["propeller_static_speed"] ** 2)
+    out = []
+    for side in sides:
+        thrust = flight.controls[f"power_{side}"] * per_power
+        series = THRUST_SIZE * thrust * _course(flight, course or "1")
+        yaw = p["engine_arm_y"] / p["inertia_zz"] * (1.0 if side == "left" else -1.0)
+        out += [Push(term.row, "u", series / p["mass"], False), Push(term.row, "r", yaw * series, False),
+                Push(term.row, "q", p["engine_arm_z"] / p["inertia_yy"] * series, False),
+                Push(term.row, f"thrust_{side}", series, True)]
+    return out
+
+
+def path_courses(flight: Reconstruction, position: FloatArray, names: Sequence[str]) -> list[FloatArray]:
+    """What generic terms add to a surface's predicted position [rad]; loads push it by what the air does."""
+    if not names:
+        return []
+    rate = np.gradient(position, flight.dt)
+    reach = max(float(np.max(np.abs(position))), 1e-3)
+    acceleration, share = np.gradient(rate, flight.dt), min(flight.dt / SECOND_ORDER, 1.0)
+    course = {"1": np.ones(len(position)), "position": position, "acceleration": acceleration,
+              "inertia": lfilter([share], [1.0, share - 1.0], acceleration),
+              "position*position*position": position**3 / reach**2, "direction": np.tanh(rate / 0.02),
+              "side": np.tanh(position / 0.02)}  # fmt: skip
+    return [PATH_SIZE[name] * course[name] if name in course else PATH_SIZE["1"] * _course(flight, name)
+            for name in names]
+
+
+def in_common(flights: Sequence[Reconstruction]) -> list[Reconstruction]:
+    """Records whose terms count deviations from one condition: the median of all of them.
+
+    A moment that is a function of the angle of attack is one function, whatever angle a record was trimmed at. A cube
+    that is far from the median in some record would be flown much larger there than anything is: no course is larger
+    than one by its root mean square.
+    """
+    if not flights:
+        return []
+    about = {factor: float(np.median(np.concatenate([_values(f, factor) for f in flights]))) for factor in DEVIATION}
+    found = [replace(f, about=about, reach={}) for f in flights]
+    names = {name for _, _, names in (*GENERIC, *BEYOND) for name in names if set(name.split("*")) <= set(DEVIATION)}
+    square = {name: np.mean(np.concatenate([_course(f, name, True) for f in found]) ** 2) for name in names}
+    return [replace(f, reach={name: max(float(np.sqrt(s)), 1.0) for name, s in square.items()}) for f in found]
+
+
+def _course(flight: Reconstruction, name: str, aerodynamic: bool = False) -> FloatArray:
+    """Product of the deviations named, in units of DEVIATION; a ramp from -1 to 1 for time, or a hat about a knot.
+
+    Args:
+        aerodynamic: what the air does with a rate of turn goes with the rate over the airspeed.
+    """
+    n = len(flight.time)
+    if name == "1":
+        return np.ones(n)
+    if name == "time":
+        return np.linspace(-1.0, 1.0, n)
+    if name.startswith(KNOT_AT):
+        passed = flight.time - flight.time[0] - float(name.removeprefix(KNOT_AT))
+        return np.maximum(1.0 - np.abs(passed) / KNOT, 0.0)
+    out = np.ones(n)
+    for factor in name.split("*"):
+        values = _values(flight, factor)
+        middle = flight.about[factor] if factor in flight.about else float(np.median(values))
+        away = (values - middle) / DEVIATION[factor]
+        if aerodynamic and factor in ("p", "q", "r", *FLOW_RATES):
+            speed = flight.channel("airspeed")
+            away = away * flight.about.get("airspeed", float(np.median(speed))) / speed
+        out = out * away
+    return out / flight.reach.get(name, 1.0)
+
+
+def _values(flight: Reconstruction, factor: str) -> FloatArray:
+    """A regressor: a control, both engines' power as a thrust coefficient, a channel, or its derivative."""
+    if factor == "CT":
+        both = flight.controls["power_left"] + flight.controls["power_right"]
+        return np.asarray(both / (flight.channel("airspeed") * _pressed_area(flight)))
+    if factor in flight.controls:
+        return flight.controls[factor]
+    if factor in FLOW_RATES:
+        values, share = flight.channel(factor.removesuffix("_dot")), 1.0 - math.exp(-flight.dt / WASHED)
+        late, _ = lfilter([share], [1.0, share - 1.0], values, zi=[(1.0 - share) * values[0]])
+        return np.asarray((values - late) * share / ((1.0 - share) * flight.dt))  # over how late a ramp is
+    if factor.endswith("_dot"):
+        values = flight.channel(factor.removesuffix("_dot"))
+        return np.diff(values, prepend=values[:1]) / flight.dt
+    return flight.channel(factor)
+
+
+def _sensor_course(flight: Reconstruction, name: str, channel: str) -> FloatArray:
+    """Bias of one tolerance, scale error of 10 %, a lag of 0.1 s, or a drift over the record."""
+    tolerance = TOLERANCE[channel]
+    if name in ("1", "time") or name.startswith(KNOT_AT):
+        return tolerance * _course(flight, name)
+    if name.startswith("slow_"):
+        course, share = _course(flight, name.removeprefix("slow_")), flight.dt / ERECTION
+        return np.asarray(tolerance * lfilter([share], [1.0, share - 1.0], course))
+    if name.startswith("rings"):
+        return _ringing(flight, name, channel)
+    if name.removesuffix("_dot") != channel:
+        return tolerance * _course(flight, name)
+    values = flight.channel(channel)
+    if name.endswith("_dot"):
+        return -0.1 * np.diff(values, prepend=values[:1]) / flight.dt  # backward: nothing of the sample to come
+    return 0.1 * (values - (0.0 if channel in FROM_ZERO else flight.about.get(channel, float(np.median(values)))))
+
+
+def _ringing(flight: Reconstruction, name: str, channel: str) -> FloatArray:
+    """A tenth of what a mode makes of a reading: of the samples before, whose noise says nothing of the next."""
+    kind, hertz = name.split(":")
+    w, values = 2.0 * math.pi * float(hertz), flight.channel(channel)
+    above = [2.0 * DAMPING * w, 0.0] if kind == "rings" else [2.0 * DAMPING * w * w]
+    b, a = bilinear(above, [1.0, 2.0 * DAMPING * w, w * w], 1.0 / flight.dt)
+    return np.asarray(0.1 * lfilter([0.0, *b], [*a, 0.0], values - values[0]))
+
+
+def unit_of(term: str, component: str, reach: Mapping[str, float] | None = None) -> float:
+    """What a generic coefficient of one stands for: of a force's or moment's coefficient, or a reading, per regressor.
+
+    Deviations are in the units of their channels; CT is power over airspeed, dynamic pressure and wing area.
+
+    Args:
+        reach: of the records.
+    """
+    course = term.removeprefix("slow_")
+    if component == "propulsion":
+        course = course.partition("*")[2]
+    own = component == f"sensor:{course}"  # a scale error is no course
+    return _unit(term, component) / (1.0 if own or reach is None else reach.get(course, 1.0))
+
+
+def _unit(term: str, component: str) -> float:
+    if component.endswith("_path"):
+        return PATH_SIZE[term] if term in PATH_SIZE else PATH_SIZE["1"] / DEVIATION[term]
+    if component == "propulsion":
+        return THRUST_SIZE / (DEVIATION["airspeed"] if term.endswith("*airspeed") else 1.0)
+    target = next(target for where, target, _ in GENERIC if where == component)
+    if component.startswith("sensor:"):
+        if term.startswith("rings") or (term not in ("1", "time") and term.removesuffix("_dot") == target):
+            return 0.1
+        size = TOLERANCE[target]
+    else:
+        size = GENERIC_SIZE[target]
+    for factor in term.removeprefix("slow_").split("*"):
+        size /= DEVIATION.get(factor, 1.0)
+    return size
+
+
+def _pressed_area(flight: Reconstruction) -> FloatArray:
+    """Dynamic pressure times wing area along a record [N], N."""
+    rho = density(float(np.median(flight.altitude)))
+    return np.asarray(0.5 * rho * flight.channel("airspeed") ** 2 * flight.parameters[0]["wing_area"])
+
+
+def _scales(flight: Reconstruction) -> dict[str, FloatArray]:
+    """Acceleration per unit coefficient along a record [m/s2, rad/s2], each [N]."""
+    p, qs = flight.parameters[0], _pressed_area(flight)
+    return {"u": qs / p["mass"], "v": qs / p["mass"], "w": qs / p["mass"], "p": qs * p["span"] / p["inertia_xx"],
+            "q": qs * p["chord"] / p["inertia_yy"], "r": qs * p["span"] / p["inertia_zz"]}  # fmt: skip
+
+
+def in_what_is_left(terms: Sequence[Term]) -> tuple[Term, ...]:
+    """The terms with their rows in what a flown set leaves, itself being row 0."""
+    return tuple(replace(term, row=1 + j) for j, term in enumerate(terms))

@@ -1,0 +1,1 @@
+"""How the size of what was found went along the records."""

@@ -1,0 +1,174 @@
+"""A gap that no one size of any effect explains: an effect whose size is another elsewhere, or changes in time.
+
+Ice that grows, or a bias that wanders, is something unknown to all that has one size, and the same generic terms in
+time may follow it. Where there is a gap for certain, and something unknown is likeliest, alone or beside one effect,
+that one, the likeliest of those alone and every other that enters where the unknown does are flown with a size for each
+stretch of every record; their departures from a common size are Gaussian (see `over_time.by_stretch`), and what so many
+numbers take by luck they pay for. Where a second one so varying says it as well, no effect is told by it: what is known
+is that something there varies in time, and that is unknown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from icing_env import effects
+from icing_env.record import FloatArray
+from sim2real.baseline.references import Baseline
+from sim2real.flown.companions import CERTAIN
+from sim2real.flown.steps import FARTHEST
+from sim2real.library.candidates import Bank, Family, shifted, unbroken
+from sim2real.over_time.by_stretch import Way, cut_up, gaussian, products, responses, ways, without
+from sim2real.over_time.history import SPREADS
+from sim2real.posterior.form import forgiven
+from sim2real.posterior.hypotheses import Hypothesis, Posterior, normalised
+from sim2real.posterior.sets import SetFit
+from sim2real.records.reconstruct import Reconstruction
+from sim2real.records.side_by_side import each
+from sim2real.signatures.courses import projected
+from sim2real.signatures.evidence import Evidence
+from sim2real.signatures.tempering import noise
+
+ROUNDS = 3  # times that the sizes are flown
+STEP = 0.05  # of the typical size, for slopes
+REACH = 2.5  # typical sizes: standard deviation of the common one (assumed)
+# Prior probability that a size varies so much that one size explains nothing (assumed): what goes with speed, and is
+# another in every record for that, is rather something unknown.
+VARIES = 0.01
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Sizes of one effect [T] and nuisances [n]; log evidence but for that of nothing at all, and square left over."""
+
+    sizes: FloatArray
+    nuisances: FloatArray
+    log: float
+    left: float
+    error: float  # of the mean size
+
+
+def varying(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
+            posterior: Posterior, centre: FloatArray) -> Posterior:  # fmt: skip
+    """The posterior with effects of varying size where something unknown is likeliest, alone or beside one effect.
+
+    Args:
+        flights: the diagnosed records about the baseline.
+        candidates, evidences: what was flown along them.
+        baseline: the model and its precision.
+        posterior: what the records say of effects of one size.
+        centre: nuisances [n] that the variants were flown about.
+    """
+    best = posterior.best
+    if posterior.none > CERTAIN or best.unknown is None or len(best.effects) > 1:
+        return posterior
+    cuts = [cut_up(flight) for flight in flights]
+    if len(tried := ways(flights, cuts)[1:]) == 0:  # one short record
+        return posterior
+    alone = [h for h in posterior.hypotheses if h.unknown is None and len(h.effects) == 1]
+    likeliest = max(alone, key=lambda h: h.log_posterior).effects if alone else ()
+    home = [f for f in unbroken(candidates.families) if f.effect.name in posterior.fits
+            and (best.unknown.component in f.effect.enters_at or f.effect.name in best.effects + likeliest)]
+    flying = _Flying(flights, candidates, evidences, baseline, posterior.tempering, cuts, tried)
+    found = [(f, flying.fitted(f, centre)) for f in home]
+    nothing = float(posterior.reduced[0, 0])
+    least = min(noise(evidences, posterior.tempering), *(h.left for h in posterior.hypotheses),
+                *(fit.left for _, fit in found))  # fmt: skip
+    single = max((h.log_prior for h in posterior.hypotheses if len(h.effects) == 1), default=-np.inf)
+    told = {h.effects: h for h in posterior.hypotheses if h.unknown is None}
+    settled = dict[tuple[str, ...], FloatArray]()
+    worth = list[float]()
+    for family, fit in found:
+        own = told.get((family.effect.name,))
+        log = fit.log + 0.5 * nothing
+        varied = Hypothesis(_set_fit(candidates, family, fit, log), None, single + float(np.log(VARIES)), log,
+                            regained=forgiven(fit.left - least, nothing - fit.left))  # fmt: skip
+        worth.append(varied.log_evidence + varied.regained)
+        if own is None or varied.log_posterior > own.log_posterior:
+            told[varied.effects], settled[varied.effects] = varied, fit.nuisances
+    others = [_or_any(h, worth) if h is best else h for h in posterior.hypotheses if h.unknown is not None]
+    out = normalised([*told.values(), *others], 0.0)
+    return replace(posterior, hypotheses=out, settled=settled.get(out[0].effects, posterior.settled))
+
+
+def _or_any(unknown: Hypothesis, worth: Sequence[float]) -> Hypothesis:
+    """Something unknown, as good as the second best of the effects that vary: `worth` of each, log evidence."""
+    if len(worth) < 2:
+        return unknown
+    return replace(unknown, log_evidence=max(unknown.log_evidence, sorted(worth)[-2] - unknown.regained))
+
+
+def _set_fit(candidates: Bank, family: Family, fit: _Fit, log: float) -> SetFit:
+    """An effect at its mean size."""
+    p, mean = family.parameter, float(np.mean(fit.sizes))
+    own = next(f for f in candidates.families if f.effect is family.effect and f.parameter is p
+               and f.low - 1e-9 <= mean <= f.high + 1e-9)  # fmt: skip
+    low, high = (float(np.clip(mean + side * 1.96 * fit.error, p.low, p.high)) for side in (-1.0, 1.0))
+    return SetFit((own,), log, (mean,), (low,), (high,), np.array([[fit.error**2]]), None, fit.left)
+
+
+@dataclass(frozen=True)
+class _Flying:
+    """What flying sizes by stretch along some records takes; `tried`: ways in which sizes may differ."""
+
+    flights: Sequence[Reconstruction]
+    candidates: Bank
+    evidences: Sequence[Evidence]
+    baseline: Baseline
+    tempering: float
+    cuts: Sequence[NDArray[np.intp]]
+    tried: Sequence[Way]
+
+    def fitted(self, family: Family, centre: FloatArray) -> _Fit:
+        """Sizes of one effect for every stretch, by Gauss and Newton from none, each step flown anew."""
+        p, n, counts = family.parameter, len(centre), [len(cut) - 1 for cut in self.cuts]
+        sizes, nuisances = np.full(sum(counts), p.neutral), np.clip(centre, -FARTHEST, FARTHEST)
+        step = STEP * (p.typical or 0.25 * (p.high - p.low))
+        for _ in range(ROUNDS):
+            own = np.split(sizes, np.cumsum(counts)[:-1])
+            rows = [_rows(flight, self.candidates, nuisances, family, s, step)
+                    for flight, s in zip(self.flights, own, strict=True)]
+            made = each(responses, self.evidences, rows, self.cuts)
+            gram = products(made, self.baseline.precision, nuisances, self.tempering)
+            found = _best(gram, n, (sizes - p.neutral) / step, self.tried)
+            now = np.clip(p.neutral + step * found.sizes, p.low, p.high)
+            asked = gram[1 : 1 + n, 0] + gram[1 : 1 + n, 1 + n :] @ (now - sizes) / step
+            give = np.linalg.solve(gram[1 : 1 + n, 1 : 1 + n], asked)
+            sizes, nuisances = now, np.clip(nuisances - give, -FARTHEST, FARTHEST)
+        return replace(found, sizes=sizes, nuisances=nuisances, error=abs(step) * found.error)
+
+
+def _rows(flight: Reconstruction, candidates: Bank, nuisances: FloatArray, family: Family, sizes: FloatArray,
+          step: float) -> NDArray:
+    """PARAMETERS in every stretch with the effect at its size there, and a step beside it [S, 2]."""
+    base = shifted(flight.parameters, candidates.nuisances, nuisances, flight.power_from)
+    both = np.stack([sizes, sizes + step], axis=1)
+    values: dict[str, dict[str, float | FloatArray]] = {
+        family.effect.name: {**family.effect.neutral(), family.parameter.name: both.ravel()}}
+    return effects.with_effects(np.repeat(base, both.size), values).reshape(both.shape)
+
+
+def _best(gram: FloatArray, n: int, sizes: FloatArray, tried: Sequence[Way]) -> _Fit:
+    """Sizes that are likeliest, all in steps from none.
+
+    Args:
+        gram: of what is left with `sizes`, nuisances [n], and a step in every stretch.
+        tried: ways in which sizes may differ.
+    """
+    flown = without(projected(gram, 1 + n), sizes)
+    logs, fits = [], []
+    for way in tried:
+        for spread in SPREADS:
+            moves = np.column_stack([np.full(len(sizes), REACH), spread * way.columns]) / STEP
+            log, mean, covariance = gaussian(flown, moves)
+            logs.append(log)
+            fits.append((moves @ mean, moves.mean(axis=0) @ covariance @ moves.mean(axis=0)))
+    there, variance = fits[int(np.argmax(logs))]
+    left = float(flown[0, 0] + 2.0 * there @ flown[1:, 0] + there @ flown[1:, 1:] @ there)
+    log = float(logsumexp(logs) - np.log(len(logs)) - 0.5 * flown[0, 0])
+    return _Fit(there, np.zeros(n), log, left, float(np.sqrt(variance)))

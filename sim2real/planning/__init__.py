@@ -1,0 +1,1 @@
+"""What records could reveal, flown or not, and what to fly next."""

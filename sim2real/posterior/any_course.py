@@ -1,0 +1,95 @@
+"""Something unknown that no generic term follows: a free course of time at one component, of unknown size.
+
+Its hats (`signatures.courses`) have heights with a Gaussian prior, alike and independent, of one of several sizes: the
+evidence is in closed form, and what so many heights take by luck they pay for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from icing_env.record import FloatArray
+from sim2real.library.terms import BEYOND, GENERIC
+from sim2real.posterior.generic import COURSE, UnknownFit
+from sim2real.records.side_by_side import each
+from sim2real.signatures.courses import Course, Courses, Remainder, in_time
+
+SIZES = (0.003, 0.01, 0.03, 0.1, 0.3)  # standard deviations of the heights, in units of a generic coefficient (assumed)
+SHARE = 1.0 / 3.0  # prior share of what is unknown at a component that generic terms do not follow (assumed)
+TOGETHER = 7  # components whose responses are computed at once
+PLACES = in_time({component for component, _, _ in (*GENERIC, *BEYOND)})
+
+
+def course_fits(courses: Courses, parts: Sequence[Sequence[FloatArray]], gram: FloatArray, held: Collection[int] = (),
+                places: Collection[str] = PLACES, keep: bool = False) -> list[UnknownFit]:
+    """Evidence of a free course at each of some components over what is left without.
+
+    Args:
+        parts: of every record, what is left and what else may give way [N x channels, rows], in parts side by side.
+        gram: inner products of these rows [rows, rows], tempered, priors among them.
+        held: rows that give way no more.
+        places: components.
+        keep: what their hats make of the records, to be asked for again.
+    """
+    gone = [j for j in range(1, len(gram)) if j not in held]
+    inverse = np.linalg.inv(gram[np.ix_(gone, gone)])
+    moved = inverse @ gram[gone, 0]
+    misfit, found = float(gram[0, 0] - gram[0, gone] @ moved), []
+    made = each(lambda course, own: _products(course, sorted(places), own, keep), courses.along, parts)
+    for component in sorted(places):
+        inner = block_diag(*(products[component][0] for products in made)) / courses.tempering
+        onto = np.concatenate([products[component][1] for products in made]) / courses.tempering
+        if np.max(np.diag(inner), initial=0.0) > 1e-9:
+            across = onto[:, gone]
+            found.append(_fit(component, inner - across @ inverse @ across.T, across @ moved - onto[:, 0], misfit))
+    return found
+
+
+def beside(courses: Courses, left: Remainder, places: Collection[str]) -> list[UnknownFit]:
+    """The same of what a set leaves where it was flown."""
+    return course_fits(courses, left.rows, left.gram[: left.first, : left.first], left.held, in_time(places), keep=True)
+
+
+def _products(course: Course, places: Sequence[str], parts: Sequence[FloatArray], keep: bool
+              ) -> dict[str, tuple[FloatArray, FloatArray]]:  # fmt: skip
+    """Inner products of a record's hats, at each component, with themselves and with other rows."""
+    if keep:
+        return {place: (course.inner(place, place), course.onto(place, parts)) for place in places}
+    found, other = {}, np.concatenate(parts, axis=1)
+    for k in range(0, len(places), TOGETHER):
+        for component, rows in course.made(places[k : k + TOGETHER]).items():
+            found[component] = np.asarray(rows.T @ rows), np.asarray(rows.T @ other)
+    return found
+
+
+def _fit(component: str, inner: FloatArray, onto: FloatArray, misfit: float) -> UnknownFit:
+    """Heights of unknown size integrated out; luck taken out of what they leave."""
+    energy, axes = np.linalg.eigh(inner)
+    energy, along = np.maximum(energy, 0.0), axes.T @ onto
+    logs = []
+    for size in SIZES:
+        shown = size**2 * energy
+        logs.append(0.5 * float(np.sum(size**2 * along**2 / (1.0 + shown)) - np.sum(np.log1p(shown))))
+    best = SIZES[int(np.argmax(logs))]
+    heights = best**2 * along / (1.0 + best**2 * energy)
+    luck = float(np.sum(best**2 * energy / (1.0 + best**2 * energy)))
+    return UnknownFit(component, float(np.logaddexp.reduce(logs) - np.log(len(SIZES))),
+                      ((COURSE, float(np.sqrt(np.mean(heights**2))), best),),
+                      misfit - max(float(along @ heights) - luck, 0.0), {})
+
+
+def with_courses(fits: Sequence[UnknownFit], courses: Sequence[UnknownFit]) -> list[UnknownFit]:
+    """Generic terms of every component, or a free course there: both counted, the likelier told."""
+    free, out = {u.component: u for u in courses}, []
+    for u in fits:
+        ways = [replace(u, log_evidence=u.log_evidence + float(np.log(1.0 - SHARE)))]
+        if u.component in free:
+            course = free[u.component]
+            ways.append(replace(course, log_evidence=course.log_evidence + float(np.log(SHARE))))
+        together = float(np.logaddexp.reduce([way.log_evidence for way in ways]))
+        out.append(replace(max(ways, key=lambda way: way.log_evidence), log_evidence=together))
+    return out

@@ -1,0 +1,218 @@
+"""One explanation of a gap, all of them with their probabilities, and what each is forgiven."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.special import logsumexp, softmax
+
+from icing_env.record import FloatArray
+from sim2real.posterior.devices import within
+from sim2real.posterior.form import LEAST, Form, at_home
+from sim2real.posterior.generic import UnknownFit
+from sim2real.posterior.likeness import MOSTLY, SHAPE, alike, calibration, foreign
+from sim2real.posterior.sets import SetFit
+from sim2real.posterior.singles import EffectFit
+
+# Prior (assumed): what is left is shared by single effects. A pair is about one per cent as likely as either member.
+P_NONE, P_UNKNOWN, P_PAIRS, P_TRIPLES, P_BESIDE = 0.8, 0.02, 0.028, 0.0008, 0.0028
+SAME_PLACE = 0.02  # of that where two members are faults of one device: another form of one is likelier (assumed)
+# Of the probability, that the evidence misleads: where the library's own form explains a gap, again for each ten times
+# that another form regains in log evidence, and at most. Chosen on 249 answers to gaps of development.
+DOUBT, PER_DECADE, MOST_DOUBT = 0.03, 0.04, 0.15
+NEXT = 0.8  # of the doubt, that it is one of those ranked next, each half as likely as the one before (assumed)
+KEPT = 1e-5  # sets of several effects less probable than this are dropped
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """One explanation: a set of effects (empty: none) and perhaps something unknown beside it.
+
+    `form`: of its effects, where that may be another than the library's; `instead`: generic terms at home that say it
+    better than the library's; `regained`: log evidence gained by these, and by what is forgiven (see `posterior.form`).
+    """
+
+    fit: SetFit
+    unknown: UnknownFit | None
+    log_prior: float
+    log_evidence: float
+    form: Form | None = None
+    instead: UnknownFit | None = None
+    regained: float = 0.0
+    probability: float = 0.0
+
+    @cached_property
+    def effects(self) -> tuple[str, ...]:
+        """Names, in alphabetical order."""
+        return tuple(sorted(self.fit.effects))
+
+    @property
+    def log_posterior(self) -> float:
+        """But for a constant."""
+        return self.log_prior + self.log_evidence + self.regained
+
+    @property
+    def left(self) -> float:
+        """Whitened square that it leaves over at best, other forms included."""
+        own = self.unknown.left if self.unknown else self.fit.misfit
+        forms = [] if self.form is None else [self.form.least]
+        return min([own, *forms, *([] if self.instead is None else [self.instead.left])])
+
+    @property
+    def pushed(self) -> dict[int, float]:
+        """Weights of the generic terms that it is flown with: of something unknown, or of its other form."""
+        return self.unknown.weights if self.unknown else self.form.weights if self.form else {}
+
+    @property
+    def weights(self) -> dict[int, float]:
+        """Of the flown rows, beside the model's."""
+        return (self.fit.weights or {}) | (self.unknown.weights if self.unknown else {})
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Probabilities that sum to one, with the fits behind them.
+
+    Attributes:
+        hypotheses: the most probable first.
+        fits: every effect on its own.
+        unknown_fits: generic terms on their own, by component.
+        classes: effects that one effect cannot be told from.
+        reduced: inner products, nuisances integrated out.
+        tempering: what the evidence was divided by.
+        raw: inner products of all rows, nuisances where they are.
+        bare: whitened square that is left where the best flown set may do whatever it likes at home.
+        courses: free courses of time, by component.
+        settled: nuisances [n] where the best flown set settled, if any was flown.
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    fits: dict[str, EffectFit]
+    unknown_fits: tuple[UnknownFit, ...]
+    classes: dict[str, tuple[str, ...]]
+    reduced: FloatArray
+    tempering: float = 1.0
+    raw: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    bare: float = np.inf
+    settled: FloatArray | None = None
+    courses: tuple[UnknownFit, ...] = ()
+
+    @property
+    def none(self) -> float:
+        """Probability of no gap."""
+        return sum(h.probability for h in self.hypotheses if not h.effects and h.unknown is None)
+
+    @property
+    def unknown(self) -> float:
+        """Probability that something is there which the library lacks, with or without known effects."""
+        return sum(h.probability for h in self.hypotheses if h.unknown is not None)
+
+    @property
+    def effects(self) -> dict[str, float]:
+        """Probability that each effect is there, alone or with others."""
+        found = dict.fromkeys(self.fits, 0.0)
+        for hypothesis in self.hypotheses:
+            for name in hypothesis.effects:
+                found[name] += hypothesis.probability
+        return found
+
+    @property
+    def best(self) -> Hypothesis:
+        """The most probable explanation."""
+        return self.hypotheses[0]
+
+    def leading(self, name: str) -> SetFit:
+        """The most probable set that holds an effect."""
+        return next(h.fit for h in self.hypotheses if name in h.effects)
+
+
+def set_prior(names: Sequence[str], testable: int) -> float:
+    """Log prior probability of a pair or triple of `testable` effects."""
+    n = testable
+    share = P_PAIRS / (n * (n - 1) / 2) if len(names) == 2 else P_TRIPLES / (n * (n - 1) * (n - 2) / 6)
+    guest = any(within(name, [other for other in names if other != name]) for name in names)
+    return float(np.log(share) + (np.log(SAME_PLACE) if guest else 0.0))
+
+
+def homes(found: Sequence[Hypothesis], alone: Sequence[UnknownFit], nothing: float,
+          raw: FloatArray) -> tuple[list[Hypothesis], tuple[UnknownFit, ...]]:
+    """Generic terms where a single effect of the library says most of the same are that effect in another form.
+
+    Returns:
+        The hypotheses, the single ones with such terms; and the terms that are nobody's.
+    """
+    out, left = list(found), []
+    for u in alone:
+        near = [i for i, h in enumerate(out) if is_home(h, u, nothing - u.misfit, nothing - h.fit.misfit, raw)]
+        if not near:
+            left.append(u)
+            continue
+        i = min(near, key=lambda i: out[i].fit.misfit)
+        now = out[i].instead
+        out[i] = replace(out[i], instead=u if now is None or u.log_evidence > now.log_evidence else now)
+    return out, tuple(left)
+
+
+def is_home(h: Hypothesis, unknown: UnknownFit, told: float, explained: float, raw: FloatArray) -> bool:
+    """Whether a single effect that enters where generic terms do says most of what they say, or the like of it.
+
+    Args:
+        told, explained: whitened square that the terms and the effect explain.
+        raw: inner products of all rows of the bank.
+    """
+    if len(h.effects) != 1 or h.unknown is not None or not at_home(unknown.component, h.effects):
+        return False
+    if foreign(h.effects[0], unknown, raw) and explained < SHAPE * told:
+        return False
+    return told > 0.0 and explained > LEAST**2 and (
+        explained > MOSTLY * told or alike(h.fit, unknown, raw) > SHAPE or calibration(h.effects[0], unknown, raw))
+
+
+def normalised(found: Sequence[Hypothesis], least: float = KEPT) -> tuple[Hypothesis, ...]:
+    """Probabilities of hypotheses, sorted; sets of several that are less probable than `least` are dropped."""
+    logs = np.array([h.log_posterior for h in found])
+    share = np.exp(logs - logsumexp(logs))
+    always = [len(h.effects) < 2 and not (h.effects and h.unknown) for h in found]
+    keep = [i for i in range(len(found)) if share[i] >= least or always[i]]
+    total = float(share[keep].sum())
+    out = [replace(found[i], probability=float(share[i]) / total) for i in keep]
+    return tuple(sorted(out, key=lambda h: -h.log_posterior))
+
+
+def doubt(regained: float) -> float:
+    """Probability that the best explanation misleads, the larger the more its own form fails and another is needed."""
+    return min(DOUBT + PER_DECADE * float(np.log10(1.0 + max(regained, 0.0))), MOST_DOUBT)
+
+
+def doubted(found: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+    """Hypotheses of a gap, a share `doubt` of the probability for those ranked next, and as before any flight.
+
+    What no model has, a filter's noise or a rival's form, is not in the evidence: where that misleads, it is mostly
+    the next in rank that is right, however far behind. Where no gap is likeliest nothing is doubted, and what misleads
+    about the kind of a gap makes no gap no likelier.
+    """
+    order = np.argsort([-h.log_posterior for h in found], kind="stable")
+    if not found[order[0]].effects and found[order[0]].unknown is None:
+        return tuple(sorted(found, key=lambda h: -h.probability))
+    before = softmax([h.log_prior if h.effects or h.unknown else -np.inf for h in found])
+    gaps = [int(i) for i in order if found[i].effects or found[i].unknown]
+    after = np.zeros(len(found))
+    after[gaps[1:]] = 0.5 ** np.arange(1, len(gaps))
+    after = after / after.sum() if len(gaps) > 1 else before
+    share = doubt(found[order[0]].regained)
+    spread = share * (NEXT * after + (1.0 - NEXT) * before)
+    out = [replace(h, probability=(1.0 - share) * h.probability + float(s))
+           for h, s in zip(found, spread, strict=True)]
+    return tuple(sorted(out, key=lambda h: -h.probability))
+
+
+def leaving_out(posterior: Posterior, names: Sequence[str]) -> Posterior:
+    """The posterior without some effects: what they held is shared by all that is left."""
+    gone = set(names)
+    left = [h for h in posterior.hypotheses if not gone & set(h.effects)]
+    classes = {n: tuple(m for m in near if m not in gone) for n, near in posterior.classes.items() if n not in gone}
+    return replace(posterior, hypotheses=normalised(left, 0.0), classes=classes,
+                   fits={n: fit for n, fit in posterior.fits.items() if n not in gone})

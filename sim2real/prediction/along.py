@@ -1,0 +1,278 @@
+"""The compiled loop of the predictor: many variants of the plant along one record, corrected after every step or not.
+
+A step from Python costs more than the flight of forty variants; this is the one place where a record is flown.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from icing_env.blocks import (
+    AIR,
+    AT_AIR,
+    AT_COMMAND,
+    AT_CURRENT,
+    AT_GUSTS,
+    AT_PARAMETERS,
+    GUSTS_AFTER,
+    GUSTS_BEFORE,
+    NOW,
+    ROWS,
+    feel_block,
+    fill,
+    recall_loads,
+    rk4_block,
+)
+from icing_env.dynamics import present_aircraft
+from icing_env.frames import euler_angles
+from icing_env.integrate import GUSTS, copy, copy_gusts
+from icing_env.jit import entry, kernel
+from icing_env.lanes import LANES, lane
+from icing_env.memory import matrix, rows
+from icing_env.parameters import PARAMETERS
+from icing_env.sensors import filter_flow_and_inertial, read_gyros_quietly, read_quietly
+from icing_env.simulate import CLOCK, NUMBER
+from icing_env.turbulence import advance_turbulence, drift_turbulence
+from icing_env.types import COMMAND, CONTINUOUS, CURRENT, MEASUREMENT, OUTCOME, STATE
+from sim2real.records.channels import FED_BACK, MEASURED, SURFACES
+
+STILL = 1e-9  # m/s: gusts below it keep their states but draw nothing
+PRESENTED = 50  # steps between two looks at what mass, ice and height make of the coefficients (held over a record)
+STATES = ("u", "v", "w", "p", "q", "r", "altitude", "alpha_downwash", "dryden_u", "dryden_v1", "dryden_v2",
+          "dryden_w1", "dryden_w2", "gust_u", "gust_v", "gust_w", "gust_w_tail", "pitot", "vane_alpha", "vane_beta",
+          *(f"filtered_{c}" for c in ("alpha", "beta", "p", "q", "r", "ax", "ay", "az")))  # fmt: skip
+SLOW_SURFACE = 4.0  # a surface's lag in steps: it moves nearly in a straight line from sample to sample
+CONTROLS = (*SURFACES, "flap", "power_left", "power_right")
+
+
+def rk4_exponential(x: float) -> float:
+    """What the Runge-Kutta step makes of exp(-x)."""
+    return 1.0 - x + x**2 / 2.0 - x**3 / 6.0 + x**4 / 24.0
+
+
+REST = 1.0 - rk4_exponential(1.0 / SLOW_SURFACE)
+
+
+def columns(kind: np.dtype, names: tuple[str, ...]) -> np.ndarray:
+    """Where fields of eight bytes lie in a record seen as numbers."""
+    return np.array([(kind.names or ()).index(name) for name in names])
+
+
+X = columns(STATE, STATES)
+MOVED = len(STATES)
+CHANGED = MOVED + 2  # roll and pitch too, corrected through the quaternion
+_E0, _E1, _E2, _E3 = (int(c) for c in columns(STATE, ("e0", "e1", "e2", "e3")))
+_Y = columns(MEASUREMENT, MEASURED[:11])
+_FELT = np.array([MEASURED.index(c) for c in ("ax", "ay", "az")])
+_PHI = int(columns(MEASUREMENT, ("phi",))[0])
+_SURFACE, _ASKED = columns(STATE, SURFACES), columns(COMMAND, SURFACES)
+_FLAP, _POWER_L, _POWER_R, _U, _GUST_U, _ALTITUDE = (int(c) for c in columns(
+    STATE, ("flap", "power_left", "power_right", "u", "gust_u", "altitude")))  # fmt: skip
+_FLAP_ASKED = int(columns(COMMAND, ("flap",))[0])
+_EFFICIENCY, _STATIC, _FACTOR_L, _FACTOR_R = (int(c) for c in columns(
+    PARAMETERS, ("propeller_efficiency", "propeller_static_speed", "thrust_factor_left",
+                 "thrust_factor_right")))  # fmt: skip
+_NORTH, _EAST, _DOWN, _NORTH_SHEAR, _EAST_SHEAR, _ABOVE = (int(c) for c in columns(
+    PARAMETERS, ("wind_north", "wind_east", "wind_down", "wind_north_shear", "wind_east_shear",
+                 "wind_reference_altitude")))  # fmt: skip
+_SCALE, _BIAS, _DRIFT = (int(c) for c in columns(
+    PARAMETERS, ("scale_altitude", "bias_altitude", "drift_altitude")))  # fmt: skip
+_TIME, _ELAPSED = int(columns(MEASUREMENT, ("time",))[0]), int(columns(CURRENT, ("elapsed",))[0])
+_N_STATE, _N_MEASUREMENT = len(STATE.names or ()), len(MEASUREMENT.names or ())
+_N_PARAMETERS, _N_COMMAND, _N_CURRENT = (len(kind.names or ()) for kind in (PARAMETERS, COMMAND, CURRENT))
+
+
+@kernel
+def steer(x: Any, u: Any, now: Any, then: Any) -> None:
+    """Let one row's surfaces go from the controls of a sample to those of the next; flap and power jump."""
+    for s in range(3):
+        x[_SURFACE[s]] = now[s]
+        u[_ASKED[s]] = now[s] + (then[s] - now[s]) / REST
+    x[_FLAP] = then[3]
+    u[_FLAP_ASKED] = then[3]
+    x[_POWER_L] = then[4]
+    x[_POWER_R] = then[5]
+
+
+@kernel
+def read(out: Any, x: Any, y: Any, p: Any) -> None:
+    """What one row's instruments should read, in the order of MEASURED."""
+    for c in range(11):
+        out[c] = y[_Y[c]]
+    out[11] = (1.0 + p[_SCALE])*x[_ALTITUDE] + p[_BIAS] + p[_DRIFT]*y[_TIME]
+    above = x[_ALTITUDE] - p[_ABOVE]
+    wind_u = ((p[_NORTH] + p[_NORTH_SHEAR]*above)*(x[_E0]**2 + x[_E1]**2 - x[_E2]**2 - x[_E3]**2)
+              + (p[_EAST] + p[_EAST_SHEAR]*above)*2.0*(x[_E1]*x[_E2] + x[_E0]*x[_E3])
+              + p[_DOWN]*2.0*(x[_E1]*x[_E3] - x[_E0]*x[_E2]))  # along body x
+    per_power = p[_EFFICIENCY] / np.sqrt((x[_U] - wind_u - x[_GUST_U])**2 + p[_STATIC]**2)
+    out[12] = p[_FACTOR_L] * x[_POWER_L] * per_power
+    out[13] = p[_FACTOR_R] * x[_POWER_R] * per_power
+
+
+@kernel
+def turn(x: Any, phi: float, roll: float, pitch: float) -> None:
+    """Turn one row's attitude by small angles (rad): `roll` about body x, `pitch` about the horizontal y."""
+    wy, wz = pitch * np.cos(phi), -pitch * np.sin(phi)
+    e0, e1, e2, e3 = x[_E0], x[_E1], x[_E2], x[_E3]
+    turned = (e0 + 0.5 * (-e1 * roll - e2 * wy - e3 * wz), e1 + 0.5 * (e0 * roll + e2 * wz - e3 * wy),
+              e2 + 0.5 * (e0 * wy + e3 * roll - e1 * wz), e3 + 0.5 * (e0 * wz + e1 * wy - e2 * roll))
+    x[_E0], x[_E1], x[_E2], x[_E3] = turned
+
+
+@kernel
+def sense(s: Any, m: Any, c: Any, p: Any, felt: tuple, dt: float) -> None:
+    """Instruments of one row at the end of a step, without noise: the fast channels and the attitude."""
+    m.time = s.step*dt
+    fx, fy, fz, airspeed, alpha, beta = felt[0], felt[1], felt[2], felt[6], felt[7], felt[8]
+    filter_flow_and_inertial(s, s, c, p, airspeed, alpha, beta, fx, fy, fz)
+    read_quietly(s, m, p)
+    phi, theta, _psi = euler_angles(s.e0, s.e1, s.e2, s.e3)
+    read_gyros_quietly(s, m, p, phi, theta)
+
+
+@kernel
+def miss(left: Any, measured: Any, stretch: Any, fed: Any, j: int) -> None:
+    """Turn one row's prediction `left` into measured less predicted, and put what corrects it into lane `j`."""
+    for c in range(len(left)):
+        left[c] = measured[c] - left[c]
+    for c in range(FED_BACK):
+        fed[c*LANES + j] = left[c]*stretch[c] if np.isfinite(measured[c]) else 0.0
+
+
+@kernel
+def gained(gain: Any, fed: Any, change: Any) -> None:
+    """Changes of a whole block's states by one gain [FED_BACK, CHANGED]; the same sums as `gained_by_one`."""
+    for s in range(CHANGED):
+        for j in range(LANES):
+            total = 0.0
+            for c in range(FED_BACK):
+                total += gain[c, s]*fed[c*LANES + j]
+            change[s*LANES + j] = total
+
+
+@kernel
+def gained_by_one(gain: Any, fed: Any, change: Any, j: int, scratch: Any) -> None:
+    """Changes of the states of lane `j` by its own gain."""
+    for s in range(CHANGED):
+        scratch[s] = 0.0
+    for c in range(FED_BACK):
+        share = fed[c*LANES + j]
+        for s in range(CHANGED):
+            scratch[s] += gain[c, s]*share
+    for s in range(CHANGED):
+        change[s*LANES + j] = scratch[s]
+
+
+@kernel
+def correct(x: Any, phi: float, change: Any, j: int) -> None:
+    """Move one row's states by what stands in lane `j`."""
+    for s in range(MOVED):
+        x[X[s]] += change[s*LANES + j]
+    turn(x, phi, change[MOVED*LANES + j], change[(MOVED + 1)*LANES + j])
+
+
+@kernel
+def advance(block: Any, states: Any, parameters: Any, speeds: Any, count: int, dt: float, substeps: int) -> None:
+    """One step of up to LANES rows by Runge and Kutta, gusts in straight lines."""
+    for j in range(count):
+        s, p = states[j], parameters[j]
+        copy_gusts(lane(block, GUSTS_BEFORE, j, GUSTS), s)
+        if p.turbulence_sigma_w > STILL:
+            advance_turbulence(s, p, speeds[j], dt)
+        else:
+            drift_turbulence(s, p, speeds[j], dt)
+        s.step += 1
+        copy(lane(block, NOW, j, CONTINUOUS), s)
+        copy_gusts(lane(block, GUSTS_AFTER, j, GUSTS), s)
+    for k in range(substeps):
+        rk4_block(block, count, dt/substeps, k, substeps)
+    for j in range(count):
+        copy_gusts(lane(block, AT_GUSTS, j, GUSTS), states[j])
+    feel_block(block, count)
+    for j in range(count):
+        copy(states[j], lane(block, NOW, j, CONTINUOUS))
+        speeds[j] = lane(block, AT_AIR, j, AIR).airspeed
+
+
+@entry
+def along(table: Any, controls: Any, first: Any, last: Any, measured: Any, stretch: Any, gain: Any, force_at: Any,
+          force: Any, error_at: Any, error: Any, known: Any, out: Any) -> None:
+    """Fly the rows of a fleet (`table`: of `Fleet.table`) along records put end to end, LANES at a time.
+
+    Nothing draws noise but gusts with an intensity above STILL; ice stays as it is.
+
+    Args:
+        controls: [N, CONTROLS].
+        first, last: samples at which each row starts, and the last of its own record, where it stays [n].
+        measured: [N, channels of MEASURED], nan where nothing was measured.
+        stretch: by which a fed-back channel's error is multiplied [n, FED_BACK].
+        gain: [1 or n, steps, FED_BACK, states then roll and pitch] of the record's steps, the last one's goes on; empty
+            for free flight.
+        force_at, force: (row, state) of what is added to states [F, 2], and how much at each sample [F, N].
+        error_at, error: (row, channel) of what is added to readings [E, 2], and how much at each sample [E, N].
+        known: what every row is accelerated by at each sample beside its own forces, m/s2 and rad/s2 in the order of
+            STATES [N, 6]; empty if nothing.
+        out: [steps, n, channels]; measured less predicted, or in free flight predicted.
+    """
+    states, readings, currents = rows(table, 0, STATE), rows(table, 1, MEASUREMENT), rows(table, 2, CURRENT)
+    parameters, outcomes = rows(table, 3, PARAMETERS), rows(table, 5, OUTCOME)
+    x, y = matrix(table, 0, _N_STATE, NUMBER), matrix(table, 1, _N_MEASUREMENT, NUMBER)
+    p, u = matrix(table, 3, _N_PARAMETERS, NUMBER), matrix(table, 4, _N_COMMAND, NUMBER)
+    held = matrix(table, 2, _N_CURRENT, NUMBER)
+    clock = rows(table, 6, CLOCK)[0]
+    block, speeds = np.zeros(ROWS*LANES), np.zeros(len(x))
+    fed, change, scratch = np.zeros(FED_BACK*LANES), np.zeros(CHANGED*LANES), np.zeros(CHANGED)
+    for i in range(len(x)):
+        speeds[i] = outcomes[i].airspeed
+    for at in range(0, len(x), LANES):
+        count = min(LANES, len(x) - at)
+        for j in range(count):
+            fill(block, AT_PARAMETERS, j, p[at + j])
+        for k in range(len(out)):
+            for j in range(count):
+                i = at + j
+                now = min(first[i] + k, last[i] - 1)
+                steer(x[i], u[i], controls[now], controls[now + 1])
+                fill(block, AT_COMMAND, j, u[i])
+                for c in range(6 if len(known) > 0 else 0):
+                    x[i, X[c]] += known[now + 1, c]*clock.dt
+                if k % PRESENTED == 0:
+                    present_aircraft(states[i], parameters[i], currents[i])
+                    fill(block, AT_CURRENT, j, held[i])
+                block[(AT_CURRENT + _ELAPSED)*LANES + j] = states[i].step*clock.dt
+            advance(block, states[at:], parameters[at:], speeds[at:], count, clock.dt, clock.substeps)
+            for j in range(count):
+                i = at + j
+                sense(states[i], readings[i], currents[i], parameters[i], recall_loads(block, j),
+                      clock.dt)
+                read(out[k, i], x[i], y[i], p[i])
+                now = min(first[i] + k, last[i] - 1)
+                for c in range(3 if len(known) > 0 else 0):
+                    out[k, i, _FELT[c]] += known[now + 1, c]
+            for j in range(len(error)):
+                i = error_at[j, 0]
+                if at <= i < at + count:
+                    out[k, i, error_at[j, 1]] += error[j, min(first[i] + k, last[i] - 1) + 1]
+            if len(gain) > 0:
+                here, alike = min(first[at] + k, last[at] - 1), len(gain) == 1 and count == LANES
+                for j in range(count):
+                    i = at + j
+                    now = min(first[i] + k, last[i] - 1)
+                    miss(out[k, i], measured[now + 1], stretch[i], fed, j)
+                    alike = alike and now == here
+                if alike:
+                    gained(gain[0, min(here, gain.shape[1] - 1)], fed, change)
+                else:
+                    for j in range(count):
+                        i = at + j
+                        now = min(first[i] + k, last[i] - 1)
+                        gained_by_one(gain[i if len(gain) > 1 else 0, min(now, gain.shape[1] - 1)], fed, change, j,
+                                      scratch)
+                for j in range(count):
+                    correct(x[at + j], y[at + j, _PHI], change, j)
+            for j in range(len(force)):
+                i = force_at[j, 0]
+                if at <= i < at + count:
+                    x[i, force_at[j, 1]] += force[j, min(first[i] + k, last[i] - 1) + 1]

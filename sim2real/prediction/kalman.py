@@ -1,0 +1,249 @@
+"""The gain that corrects the predictor: Kalman's, for the plant linearised about a record and one gust intensity.
+
+The plant is linearised by differences of its own one-step map, gust filters and instruments included. Gusts act within
+the step whose end is measured, so that process and measurement noise are correlated (Anderson & Moore, Optimal
+Filtering, section 5.4). The first seconds have gains of their own, from the uncertainty of the start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from icing_env.jit import entry
+from icing_env.record import FloatArray
+from icing_env.turbulence import pair_noise, scales
+from sim2real.prediction.predictor import TANGENT, Predictor
+from sim2real.records.channels import FED_BACK, MEASURED, NOISE_FLOOR, SURFACES
+from sim2real.records.reconstruct import Reconstruction
+
+# What disturbs the states beside gusts, per square root of second: little, since what is disturbed is forgotten, steady
+# moments first; and per m/s of gusts beside `_within_steps`. Both are set where innovations of aircraft that the model
+# knows are white, means over 100 samples and over whole records included (`tests/test_whiteness.py`).
+WALK = {"u": 3e-3, "v": 3e-3, "w": 3e-3, "p": 3e-5, "q": 3e-5, "r": 3e-5, "altitude": 5e-3, "phi": 4e-5, "theta": 4e-5}
+WALK_OF_GUST = {"q": 2.5e-4, "phi": 5e-5, "theta": 5e-5}
+DRYDEN = [i for i, name in enumerate(TANGENT) if name.startswith("dryden")]
+INPUTS = dict.fromkeys(SURFACES, 1e-3) | {"power_left": 1e3, "power_right": 1e3}  # steps for slopes, rad and W
+TRANSIENT = 10.0  # s with gains of their own after the start
+SPAN = 1.0  # s along a record that are flown as if at one condition
+ROUGH = 60  # steps after which a gust no longer shows in third differences
+DOUBLINGS = 16  # 65536 steps
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Gain and innovation covariance for one gust intensity.
+
+    Attributes:
+        sigma: m/s.
+        K: of the steps, the last one's for good [steps, states, fed-back channels].
+        S: covariance of the steady innovations, or of each step's [steps, ...].
+        model: A, C, and the covariances of the states' noise, the readings' noise and between them.
+        duration: steps of the start that have gains of their own.
+    """
+
+    sigma: float
+    K: FloatArray
+    S: FloatArray
+    model: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+    duration: int
+
+    def with_start(self) -> Gain:
+        """The same with gains of their own for the first steps, from the uncertainty of the start."""
+        first, _, _ = _recursion(*self.model, _start_covariance(self.sigma), self.duration)
+        return replace(self, K=np.concatenate([first, self.K[-1:]]))
+
+
+def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),)) -> tuple[FloatArray, FloatArray,
+                                                                                        FloatArray]:
+    """A, C of the one-step map about the record's typical state in each span, and B for a step of each of INPUTS.
+
+    z' = A z, y' = C z with y' all readings at the end of the step; the first axis goes over the spans.
+    """
+    size = np.full(len(TANGENT), 1e-4)
+    size[[TANGENT.index(n) for n in ("u", "v", "w", "altitude", "pitot")]] = 1e-2
+    size[[i for i, n in enumerate(TANGENT) if n.startswith(("dryden", "gust"))]] = 1e-2
+    n, m = len(TANGENT), len(spans)
+    each = 2 * n + 2 * len(INPUTS) + 1
+    flown = Predictor(flight, flight.parameters, m * each)
+    flown.place_in(spans, each)
+    change = np.zeros((each, n))
+    change[:n], change[n : 2 * n] = np.diag(size), -np.diag(size)
+    flown.correct(np.tile(change, (m, 1)))
+    for j, (name, step) in enumerate(INPUTS.items()):
+        flown.fleet.state[name][2 * n + 2 * j :: each] += step
+        flown.fleet.state[name][2 * n + 2 * j + 1 :: each] -= step
+    for surface in SURFACES:
+        flown.fleet.command[surface] = flown.fleet.state[surface]
+    flown.fleet.step()
+    y, z = flown.read().reshape(m, each, -1), flown.tangent().reshape(m, each, -1)
+    A = np.swapaxes((z[:, :n] - z[:, n : 2 * n]) / (2.0 * size[:, None]), 1, 2)
+    C = np.swapaxes((y[:, :n] - y[:, n : 2 * n]) / (2.0 * size[:, None]), 1, 2)
+    B = np.stack([(z[:, 2 * n + 2 * j] - z[:, 2 * n + 2 * j + 1]) / (2.0 * step)
+                  for j, step in enumerate(INPUTS.values())], axis=2)  # fmt: skip
+    return A, C, B
+
+
+def gains(flight: Reconstruction, sigmas: tuple[float, ...]) -> list[Gain]:
+    """Steady gain and innovation covariance for each gust intensity."""
+    A, C, B = (matrix[0] for matrix in linearise(flight))
+    C, out = C[:FED_BACK], list[Gain]()
+    for sigma in sigmas:
+        Qw, columns = _gusts(flight, sigma)
+        rough = roughness(A, C, A[:, columns], C[:, columns], Qw)
+        model = _noisy(flight, A, C, B, sigma, Qw, flight.noise[:FED_BACK] ** 2 - rough)
+        steady, S = _steady(*model)
+        out.append(Gain(sigma, steady[None], S, model, round(TRANSIENT / flight.dt)))
+    return out
+
+
+def follow(flight: Reconstruction, gain: Gain) -> Gain:
+    """The same gust intensity with gains along the record, linearised anew every second.
+
+    In a bank a gust moves other channels than in level flight; a gain that does not know it leaves innovations
+    coloured just where manoeuvres are, and constant errors of attitude and rates seem to be found there.
+    """
+    steps, each = len(flight.time) - 1, max(round(SPAN / flight.dt), 1)
+    spans = [slice(k, min(k + each, steps + 1)) for k in range(0, steps, each)]
+    P, (Qw, columns) = _start_covariance(gain.sigma), _gusts(flight, gain.sigma)
+    D = gain.model[1][:, columns]
+    noise = np.diag(gain.model[3] - D @ Qw @ D.T) * np.maximum(read_share(flight), 1e-3)
+    K, S = [], []
+    for span, A, C, B in zip(spans, *linearise(flight, spans), strict=True):
+        model = _noisy(flight, A, C[:FED_BACK], B, gain.sigma, Qw, noise)
+        here, covariance, P = _recursion(*model, P, min(each, steps - span.start))
+        K.append(np.swapaxes(here, 1, 2))
+        S.append(covariance)
+    by_channel = np.ascontiguousarray(np.concatenate(K))  # in memory as the loop of the predictor reads them
+    return replace(gain, K=np.swapaxes(by_channel, 1, 2), S=np.concatenate(S))
+
+
+def read_share(flight: Reconstruction) -> FloatArray:
+    """Share of the samples at which every fed-back channel was read [FED_BACK]."""
+    return flight.once("read", lambda: np.mean(np.isfinite(flight.measured[:, :FED_BACK]), axis=0))
+
+
+def _gusts(flight: Reconstruction, sigma: float) -> tuple[FloatArray, list[int]]:
+    """Covariance of what drives the gusts over a step, and which states it drives."""
+    speed, height = float(np.median(flight.channel("airspeed"))), float(np.median(flight.altitude))
+    return gust_noise(sigma, speed, height, flight.dt), DRYDEN
+
+
+def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, sigma: float, Qw: FloatArray,
+           noise: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """A, C, and the covariances of the states' noise, the readings' noise and between them.
+
+    Args:
+        sigma: gust intensity.
+        Qw: covariance of what drives the gusts.
+        noise: variance of every fed-back channel's own noise.
+    """
+    worse = flight.inadequacy.walk
+    walk = np.array([np.hypot(worse * WALK.get(n, 1e-6), WALK_OF_GUST.get(n, 0.0) * sigma) for n in TANGENT])
+    read = read_share(flight)
+    least = np.array([NOISE_FLOOR[name] for name in MEASURED[:FED_BACK]])
+    G, D = A[:, DRYDEN], C[:, DRYDEN]
+    driven = np.concatenate([flight.surface_noise, flight.power_noise])
+    Q = G @ Qw @ G.T + np.diag(walk**2 * flight.dt) + (B * driven**2) @ B.T + _within_steps(A, Qw)
+    R = np.diag(np.where(read == 0.0, 1e6, np.maximum(noise, least**2) / np.maximum(read, 1e-3)))
+    return A, C, Q, D @ Qw @ D.T + R, G @ Qw @ D.T
+
+
+def _within_steps(A: FloatArray, Qw: FloatArray) -> FloatArray:
+    """Covariance of the states' noise from how gusts leave the straight lines between samples that the model has.
+
+    White noise drives them: about its line such a gust is a Brownian bridge, whose mean over the step has a twelfth of
+    the variance that the step adds. The tail's delay (a Pade form) passes what is quick with its sign turned, and twice
+    that mean a little later.
+    """
+    u, v, w, tail = (TANGENT.index(n) for n in ("gust_u", "gust_v", "gust_w", "gust_w_tail"))
+    moved = [*(TANGENT.index(n) for n in ("u", "v", "w", "p", "q", "r")), tail]
+    shape = np.zeros((3, 5))
+    shape[0, 0], shape[1, 1:3], shape[2, 3:5] = 1.0, *[[np.sqrt(1.5), (1.0 - np.sqrt(3.0)) / np.sqrt(2.0)]] * 2
+    of_tail = 2.0 * A[moved, tail] / (1.0 + A[tail, tail])  # of a gust there that lasts the step
+    of_wing = 2.0 * A[moved, w] - A[tail, w] * of_tail
+    mean = np.column_stack([2.0 * A[moved, u], 2.0 * A[moved, v], of_wing - of_tail])
+    mean[-1] = 0.0, 0.0, 2.0 * (1.0 - A[tail, tail])
+    out = np.zeros_like(A)
+    out[np.ix_(moved, moved)] = mean * np.diag(shape @ Qw @ shape.T) @ mean.T / 12.0
+    return out
+
+
+def roughness(A: FloatArray, C: FloatArray, G: FloatArray, D: FloatArray, Qw: FloatArray) -> FloatArray:
+    """What gusts add to each channel's noise variance as third differences tell it [channels].
+
+    At sigma_w = 1.5 m/s they double the apparent noise of az; believed, it makes the gain too small, the innovations
+    coloured, and the colour looks like a vane's scale and a downwash lag.
+    """
+    response, state = [np.zeros_like(D)] * 3 + [D], G
+    for _ in range(ROUGH):
+        response.append(C @ state)
+        state = A @ state
+    third = np.diff(np.array(response), 3, axis=0)
+    return np.asarray(np.einsum("nci,ij,ncj->c", third, Qw, third) / 20.0)
+
+
+def _steady(
+    A: FloatArray, C: FloatArray, Q: FloatArray, R: FloatArray, cross: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Gain and innovation covariance: the Riccati equation by doubling (Chu, Fan, Lin & Wang, IJC 77, 2004)."""
+    Rinv = np.linalg.inv(R)
+    a, H, G = (A - cross @ Rinv @ C).T, Q - cross @ Rinv @ cross.T, C.T @ Rinv @ C
+    for _ in range(DOUBLINGS):
+        middle = np.linalg.solve(np.eye(len(A)) + G @ H, np.hstack([a, G]))
+        aw, gw = middle[:, : len(A)], middle[:, len(A) :]
+        a, G, H = a @ aw, G + a @ gw @ a.T, H + a.T @ H @ aw
+        G, H = 0.5 * (G + G.T), 0.5 * (H + H.T)
+    S = C @ H @ C.T + R
+    return np.asarray(np.linalg.solve(S, (A @ H @ C.T + cross).T).T, np.float64), S
+
+
+def _recursion(A: FloatArray, C: FloatArray, Q: FloatArray, R: FloatArray, cross: FloatArray, P: FloatArray,
+               steps: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Gains [steps, states, channels] and innovation covariances from the states' covariance `P`, and P after them."""
+    K, covariance = np.empty((steps, len(A), len(C))), np.empty((steps, len(C), len(C)))
+    after = P.copy()
+    _recurse(np.ascontiguousarray(A), np.ascontiguousarray(C), Q, R, np.ascontiguousarray(cross), after, K, covariance)
+    return K, covariance, after
+
+
+@entry
+def _recurse(A: Any, C: Any, Q: Any, R: Any, cross: Any, P: Any, K: Any, covariance: Any) -> None:
+    """Riccati's recursion, step by step; P is changed in place."""
+    At, Ct = np.ascontiguousarray(A.T), np.ascontiguousarray(C.T)
+    for k in range(len(K)):
+        PC = np.dot(P, Ct)
+        covariance[k] = np.dot(C, PC) + R
+        onto = np.dot(A, PC) + cross
+        gain = np.ascontiguousarray(np.linalg.solve(covariance[k], np.ascontiguousarray(onto.T)).T)
+        K[k] = gain
+        after = np.dot(np.dot(A, P), At) - np.dot(gain, np.ascontiguousarray(onto.T)) + Q
+        P[:] = 0.5*(after + after.T)
+
+
+def _start_covariance(sigma: float) -> FloatArray:
+    """How well a quarter of a second of measurements gives the start: gusts pass for motion through the air."""
+    gust = sigma + 0.3
+    size = {"u": gust, "v": gust, "w": gust, "p": 0.02, "q": 0.02, "r": 0.02, "altitude": 1.0, "alpha_downwash": 0.02,
+            "pitot": 0.3, "vane_alpha": 0.01, "vane_beta": 0.01, "phi": 0.003, "theta": 0.003}  # fmt: skip
+    for name in TANGENT:
+        if name.startswith(("dryden", "gust")):
+            size[name] = sigma + 1e-3
+        elif name.startswith("filtered"):
+            size[name] = 1.0 if name[-2:] in ("ax", "ay", "az") else 0.02
+    return np.diag([size[name] ** 2 for name in TANGENT])
+
+
+def gust_noise(sigma: float, speed: float, height: float, dt: float) -> FloatArray:
+    """Covariance of what drives dryden_u, v1, v2, w1, w2 over a step [5, 5] (filters of icing_env.turbulence)."""
+    length_uv, length_w, ratio = scales(height)
+    out = np.zeros((5, 5))
+    for first, length, intensity in ((1, length_uv, ratio * sigma), (3, length_w, sigma)):
+        _, l11, l21, l22 = pair_noise(speed * dt / length)
+        factor = intensity * np.array([[l11, 0.0], [l21, l22]])
+        out[first : first + 2, first : first + 2] = factor @ factor.T
+    out[0, 0] = (ratio * sigma * pair_noise(speed * dt / length_uv)[1]) ** 2
+    return out

@@ -1,0 +1,1 @@
+"""Flight records as a simulation needs them: time, controls, instruments, noise, start."""
