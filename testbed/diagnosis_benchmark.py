@@ -6,17 +6,16 @@ answer is written as soon as it is there, so that an interrupted run goes on whe
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from datetime import UTC, datetime
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from icing_env.errors import InputError
+from testbed.ledger import enter, enter_draw
 from testbed.rivals import RIVALS
 from testbed.withheld.draw import DEVELOPMENT_SEED
 from testbed.withheld.files import read_json, tampered, write_text
@@ -28,14 +27,12 @@ from testbed.workers import a_core_each
 
 QUICK, FULL = 150, 2400
 OPEN = 0o700  # of the key folder outside the diagnosis
-LEDGER_COLUMNS = ("date", "set", "cases", "sources", "manifest", "top1", "top3", "null_false_alarm", "pair_exact_set",
-                  "unknown_auroc_above_8", "where_f1", "ece", "coverage95", "closure_median")  # fmt: skip
 Progress = Callable[[str], None]
 
 
 @a_core_each()
 def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Progress,
-            without: bool = False, rivals: bool = False) -> dict[str, Any]:
+            without: bool = False, rivals: bool = False, ledger: Path | None = None) -> dict[str, Any]:
     """Draw (or finish drawing) a set in `out`, diagnose every case, fly the answers again, score.
 
     Args:
@@ -46,11 +43,15 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
         progress: told what is being done.
         without: diagnose some single effects again, their own effect left out of the library.
         rivals: let every rival (`testbed.rivals`) answer too, into `answers_NAME`; what stands there is scored anyway.
+        ledger: file that is told, by a line each, of the set once it is drawn and of its figures.
 
     Raises:
         InputError: `out` holds another set, or its files are not those of its manifest.
     """
+    kind = "development" if seed is not None else "sealed"
     committed = _drawn(out, cases, seed, workers, progress)
+    if ledger is not None:
+        enter_draw(ledger, kind, committed, out)
     names = sorted(committed["cases"])
     _solve(out, "answers", dict.fromkeys(names, ()), workers, progress)
     for rival in RIVALS if rivals else ():
@@ -63,8 +64,10 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
     progress("scoring")
     there = [out / f"answers_{rival}" for rival in RIVALS if any((out / f"answers_{rival}").glob("*.json"))]
     found = score(out / "answers", out / "keys", out / "refly", out / "answers_without", *there)
-    return found | {"set": "development" if seed is not None else "sealed",
-                    "sources": committed["sources"]}  # fmt: skip
+    found |= {"set": kind, "sources": committed["sources"]}
+    if ledger is not None:
+        enter(ledger, found, out)
+    return found
 
 
 def _drawn(out: Path, cases: int, seed: int | None, workers: int, progress: Progress) -> dict[str, Any]:
@@ -166,20 +169,6 @@ def answered(work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         return {"error": str(error)}
     except Exception as error:
         return {"error": f"{type(error).__name__}: {error}"}
-
-
-def enter_ledger(path: Path, found: dict[str, Any], out: Path) -> None:
-    """Append one line to the ledger; what stands there is never changed."""
-    from testbed.withheld.files import digest_of
-
-    row = {name: found.get(name) for name in LEDGER_COLUMNS} | {
-        "date": datetime.now(UTC).isoformat(timespec="seconds"), "manifest": digest_of(out / "manifest.json")}
-    new = not path.exists()
-    with path.open("a", encoding="utf-8", newline="") as stream:
-        writer = csv.DictWriter(stream, LEDGER_COLUMNS, lineterminator="\n")
-        if new:
-            writer.writeheader()
-        writer.writerow({k: f"{v:.4g}" if isinstance(v, float) else v for k, v in row.items()})
 
 
 def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[str]]]]:

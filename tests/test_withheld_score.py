@@ -151,13 +151,13 @@ def test_a_killed_run_goes_on_with_the_answers_it_has(perfect, tmp_path):
     for name in names:  # as if flown again before
         (tmp_path / "refly" / f"{name}.json").write_text('{"after": 0.1, "own_after": 0.1}')
     said: list[str] = []
-    found = run.measure(tmp_path, len(names), 0, 1, said.append)
-    assert found["top1"] == 1.0 and found["set"] == "development" and said == ["scoring"]
     ledger = tmp_path / "ledger.csv"
     for _ in range(2):
-        run.enter_ledger(ledger, found, tmp_path)
-    lines = ledger.read_text().splitlines()
-    assert len(lines) == 3 and lines[0].startswith("date,set,cases")
+        found = run.measure(tmp_path, len(names), 0, 1, said.append, ledger=ledger)
+    assert found["top1"] == 1.0 and found["set"] == "development" and said == ["scoring"] * 2
+    lines = [line.split(",") for line in ledger.read_text().splitlines()]
+    assert [line[1] for line in lines] == ["set", "development drawn", "development", "development"]
+    assert len({line[4] for line in lines[1:]}) == 1 and lines[1][5] == "" and lines[2][5] == "1"
     assert run.tables(found)[0][2][0][1] == "120"
     for cases, seed in ((5, 0), (len(names), 1), (len(names), None)):
         with pytest.raises(run.InputError, match="holds a development set of 120 cases"):

@@ -41,7 +41,7 @@ icing benchmark diagnosis --jsbsim"""
 @click.option("--jsbsim", is_flag=True, help="diagnosis: JSBSim's DHC-6 as the aircraft; 16 cases if not told.")
 @click.option("--jsbsim-root", type=click.Path(file_okay=False), help="diagnosis: a JSBSim tree; else JSBSIM_ROOT.")
 @click.option("--ledger", type=click.Path(path_type=Path, dir_okay=False),
-              help="diagnosis: append a line on this run to that file.")
+              help="diagnosis: append to that file what was drawn, and then its figures.")
 @click.option("--without", is_flag=True, help="diagnosis: also each effect in turn left out of the library.")
 @click.option("--rivals", is_flag=True, help="diagnosis: diagnoses of other kinds answer too, as baselines.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="diagnosis: processes.")
@@ -114,12 +114,10 @@ def _adaptation(quick: bool, as_json: bool) -> None:
 
 def _diagnosis(quick: bool, cases: int | None, seed: int | None, out: Path, ledger: Path | None, workers: int,
                without: bool, rivals: bool, as_json: bool) -> None:
-    from testbed.diagnosis_benchmark import FULL, QUICK, enter_ledger, measure, tables
+    from testbed.diagnosis_benchmark import FULL, QUICK, measure, tables
 
     found = measure(out, cases or (QUICK if quick else FULL), seed, workers, lambda what: click.echo(what, err=True),
-                    without, rivals)
-    if ledger is not None:
-        enter_ledger(ledger, found, out)
+                    without, rivals, ledger)
     _show(found, tables(found), as_json)
 
 
