@@ -13,7 +13,7 @@ from controllers.ice_management import adapt
 from icing_env import aircraft
 from icing_env.trim import trim
 from icing_env.types import COMMAND, ESTIMATE
-from testbed.adaptation_study import FIGURES, attitude, found, judge, worst
+from testbed.benchmarks.adaptation import FIGURES, attitude, found, judge, worst
 from testbed.flying_qualities import level, qualities
 from testbed.oracle import derivatives
 

@@ -13,7 +13,7 @@ from estimators.signals.instruments import calibrated, calibration, time_constan
 from icing_env import scenario as scenarios
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, RecordMeta, read, write
-from testbed.coverage import DEVELOPMENT, doublet_record
+from testbed.benchmarks.coverage import DEVELOPMENT, doublet_record
 from testbed.flight import fly
 from testbed.reproduce.windows import part
 

@@ -14,8 +14,8 @@ from scipy.special import ellipj, ellipkinc
 
 from icing_env.atmosphere import density
 from icing_env.errors import InputError
-from testbed import checkcases
-from testbed.checkcases import CASES, GM, START, WGS84, Case, Trajectory, differences, fly, gravity
+from testbed.benchmarks import checkcases
+from testbed.benchmarks.checkcases import CASES, GM, START, WGS84, Case, Trajectory, differences, fly, gravity
 
 FOLDER = Path(os.environ.get("ICING_CHECK_CASES") or Path(__file__).resolve().parents[2] / "shared" / "checkcases")
 ABSENT = "set ICING_CHECK_CASES to the folder of NASA's trajectories"

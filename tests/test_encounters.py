@@ -7,8 +7,8 @@ import pytest
 
 from icing_env.severity import iced_aircraft
 from icing_env.types import CURRENT, STATE
-from testbed import encounters
-from testbed.encounter_figures import row, tables
+from testbed.benchmarks import encounters
+from testbed.benchmarks.protection import row, tables
 from testbed.oracle import zero_lift_drag
 
 

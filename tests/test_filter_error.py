@@ -13,7 +13,7 @@ from estimators.likelihood import filter_error, output_error
 from estimators.likelihood.inputs import scale_lengths
 from icing_env.record import FlightRecord, read
 from icing_env.turbulence import scales
-from testbed.coverage import DEVELOPMENT, study
+from testbed.benchmarks.coverage import DEVELOPMENT, study
 
 NOISE = {"beta": 0.0017, "p": 0.0017, "r": 0.0017, "phi": 0.0017, "ay": 0.05}
 

@@ -16,8 +16,8 @@ from estimators.methods import METHODS
 from estimators.regression import equation_error
 from icing_env.errors import InputError
 from icing_env.record import read, write
-from testbed.flown_again import derivatives, explained, fly_again, published
-from testbed.identify_figures import autocorrelation
+from testbed.reports.flown_again import derivatives, explained, fly_again, published
+from testbed.reports.identification_figures import autocorrelation
 
 
 def test_a_flight_flown_again_with_its_own_derivatives_is_that_flight():

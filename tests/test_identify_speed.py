@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from estimators.methods import METHODS
-from testbed.identify_speed import REAL_TIME, chain, flight, regress
+from testbed.benchmarks.identify_speed import REAL_TIME, chain, flight, regress
 
 
 def test_the_timed_record_is_longitudinal_and_twenty_seconds_long() -> None:

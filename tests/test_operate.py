@@ -9,8 +9,8 @@ from controlled import airframe, believed, cruise
 from controllers import ice_management
 from icing_env import scenario
 from icing_env.types import TARGET
+from testbed.benchmarks.ice_protection import fly
 from testbed.flight import make_world
-from testbed.ice_protection_study import fly
 
 DT = 0.5
 TUNING = ice_management.load_tuning()

@@ -9,7 +9,7 @@ import pytest
 from test_withheld_score import answer, key, write
 
 from icing_env.errors import InputError
-from testbed.pooled_sets import pooled
+from testbed.benchmarks.pooled_sets import pooled
 from testbed.withheld import files
 
 RIGHT, WRONG = "effect_1", "effect_2"

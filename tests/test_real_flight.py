@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from icing_env.errors import InputError
-from testbed import policy_study, real_flight
-from testbed.real_flight import Known, measure, textbook_sizes
+from testbed.benchmarks import policies, real_flight
+from testbed.benchmarks.real_flight import Known, measure, textbook_sizes
 from testbed.textbook import folder
 
 HERE = pytest.mark.skipif(not folder().is_dir(), reason="no recorded flights: set ICING_FLIGHT_DATA")
@@ -32,7 +32,7 @@ def test_an_answer_is_judged_by_its_interval_and_its_detection_limit():
     assert replace(said, probability=0.0, smallest=None, low95=None, high95=None).outcome == "below its detection limit"
 
 
-@pytest.mark.parametrize("study", [real_flight, policy_study])
+@pytest.mark.parametrize("study", [real_flight, policies])
 def test_an_unknown_case_is_refused_with_the_nearest(study):
     with pytest.raises(InputError, match="did you mean"):
         study.measure([f"{next(iter(study.CASES))}x"])

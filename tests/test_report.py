@@ -18,9 +18,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from icing_env.errors import InputError
-from testbed.plot_style import KNOT, ROLES, SCALES
-from testbed.plotting import derivative_dots, estimate_history, gap_bars, time_histories
-from testbed.report import Report, figure_source, format_cell
+from testbed.reports.page import Report, figure_source, format_cell
+from testbed.reports.plot_style import KNOT, ROLES, SCALES
+from testbed.reports.plotting import derivative_dots, estimate_history, gap_bars, time_histories
 
 T = np.linspace(0.0, 10.0, 101)
 

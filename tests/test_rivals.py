@@ -14,7 +14,7 @@ from icing_env.effects.effect import ENTERS_AT
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, write
 from sim2real.records.reconstruct import reconstruct
-from testbed import diagnosis_benchmark as run
+from testbed.benchmarks import diagnosis as run
 from testbed.flight import fly
 from testbed.rivals import RIVALS, coefficients, scales, solve
 from testbed.rivals.opinion import Opinion, Scale, Size, answer, probabilities

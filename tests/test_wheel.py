@@ -13,11 +13,11 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 LOOK = """
-import icing_env.aircraft, icing_env.configuration as c, estimators, controllers, sim2real, testbed.report
+import icing_env.aircraft, icing_env.configuration as c, estimators, controllers, sim2real, testbed.reports.page
 assert "site-packages" in str(c.folder()), c.folder()
 assert "twin_otter" in c.available("aircraft"), c.available("aircraft")
 assert icing_env.aircraft.load() is not None
-assert "<html" in testbed.report.Report("title").html()
+assert "<html" in testbed.reports.page.Report("title").html()
 import gymnasium
 env = gymnasium.make("icing_env/TwinOtter-v0", observer=False, management=False, protection=False)
 assert env.observation_space.contains(env.reset(seed=1)[0])

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from testbed import diagnosis_benchmark as run
+from testbed.benchmarks import diagnosis as run
 from testbed.withheld import files, score
 
 NAMES = [f"effect_{i}" for i in range(20)]

@@ -51,7 +51,7 @@ RESOLUTION = {"longitudinal": (1e-4, 1e-4, 1e-4, 0.003, 0.003), "lateral": (1e-4
 WIDE = 3.0  # of the logarithm of an intensity
 KNOWN = {"scale": 0.03, "lag": 0.03, "az": 0.1, "ay": 0.1, "lift": 0.05}  # by the last word of a name: 1, s, m/s2, 1
 # What the model of the gust leaves unexplained, as a share of each derivative: by how much errors over simulated
-# flights in turbulence (development flights of testbed.coverage) exceed what the likelihood tells. It enters the
+# flights in turbulence (development flights of benchmarks.coverage) exceed what the likelihood tells. It enters the
 # standard error in so far as the gust exceeds FELT, m/s; what it leaves of the pitching moment is said beyond SAID.
 MISFIT = {"CZ_alpha": 0.015, "CZ_q": 0.05, "CZ_elevator": 0.05, "Cm_alpha": 0.015, "Cm_q": 0.03, "Cm_elevator": 0.035,
           "CY_r": 0.025, "CY_rudder": 0.022, "Cl_p": 0.003, "Cl_aileron": 0.003, "Cl_rudder": 0.02}  # fmt: skip

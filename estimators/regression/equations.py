@@ -20,7 +20,7 @@ from icing_env.record import FloatArray
 
 EXCITED = np.radians(0.25)  # rms of a surface about its trend below which it has not moved (assumed)
 # What the equations leave out in doublets, as a share of each derivative: by how much errors over calm simulated
-# flights (development flights of testbed.coverage) exceed what residuals tell. In pitch it is the downwash, which
+# flights (development flights of benchmarks.coverage) exceed what residuals tell. In pitch it is the downwash, which
 # reaches the tail tail_arm/V late: a moment by q stands for that to first order only. In roll and yaw it is noise and
 # slopes of regressors behind filters.
 LEFT_OUT = {"Cm_alpha": 0.008, "Cm_q": 0.014, "Cm_elevator": 0.018, "CY_beta": 0.008, "Cl_beta": 0.006, "Cl_p": 0.005,

@@ -92,7 +92,7 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
 def _cases(name: str, only: str | None, as_json: bool) -> None:
     from importlib import import_module
 
-    study = import_module({"real_flight": "testbed.real_flight", "policies": "testbed.policy_study"}[name])
+    study = import_module(f"testbed.benchmarks.{name}")
     chosen = [case.strip() for case in only.split(",")] if only else []
     found = study.measure(chosen, lambda what: click.echo(f"{what} ...", err=True))
     if as_json:
@@ -106,7 +106,7 @@ def _cases(name: str, only: str | None, as_json: bool) -> None:
 
 
 def _adaptation(quick: bool, as_json: bool) -> None:
-    from testbed.adaptation_study import measure, tables
+    from testbed.benchmarks.adaptation import measure, tables
 
     found = measure(quick, lambda what: click.echo(f"{what} ...", err=True))
     _show(found, tables(found), as_json)
@@ -114,7 +114,7 @@ def _adaptation(quick: bool, as_json: bool) -> None:
 
 def _diagnosis(quick: bool, cases: int | None, seed: int | None, out: Path, ledger: Path | None, workers: int,
                without: bool, rivals: bool, as_json: bool) -> None:
-    from testbed.diagnosis_benchmark import FULL, QUICK, measure, tables
+    from testbed.benchmarks.diagnosis import FULL, QUICK, measure, tables
 
     found = measure(out, cases or (QUICK if quick else FULL), seed, workers, lambda what: click.echo(what, err=True),
                     without, rivals, ledger)
@@ -122,8 +122,8 @@ def _diagnosis(quick: bool, cases: int | None, seed: int | None, out: Path, ledg
 
 
 def _pooled(folders: tuple[Path, ...], as_json: bool) -> None:
-    from testbed.diagnosis_benchmark import tables
-    from testbed.pooled_sets import pooled
+    from testbed.benchmarks.diagnosis import tables
+    from testbed.benchmarks.pooled_sets import pooled
 
     found = pooled(folders)
     _show(found, tables(found), as_json)
@@ -139,14 +139,14 @@ def _show(found: Any, tables: Iterable[tuple[str, dict[str, str], list[list[str]
 
 
 def _jsbsim(cases: int | None, seed: int, out: Path, workers: int, root: str | None, as_json: bool) -> None:
-    from testbed.jsbsim_benchmark import measure, tables
+    from testbed.benchmarks.jsbsim import measure, tables
 
     found = measure(out, cases, seed, workers, root, lambda what: click.echo(what, err=True))
     _show(found, tables(found), as_json)
 
 
 def _protection(quick: bool, encounters: int | None, only: str | None, as_json: bool) -> None:
-    from testbed.encounter_figures import WHO, measure, tables
+    from testbed.benchmarks.protection import WHO, measure, tables
 
     names = tuple(name.strip() for name in only.split(",")) if only else ()
     for name in names:
@@ -157,7 +157,7 @@ def _protection(quick: bool, encounters: int | None, only: str | None, as_json: 
 
 
 def _speed(as_json: bool) -> None:
-    from testbed.speed import measure
+    from testbed.benchmarks.speed import measure
 
     figures = measure(lambda what: click.echo(f"timing {what} ...", err=True))
     if as_json:

@@ -10,7 +10,7 @@ import click
 from testbed.commands.common import print_json, verb
 
 if TYPE_CHECKING:
-    from testbed.demo import Demonstration, Size
+    from testbed.demo.demonstration import Demonstration, Size
 
 MARKS = {"good": "[green]✓[/]", "caution": "[yellow]![/]", "bad": "[red]✕[/]", "info": "[blue]i[/]"}
 
@@ -26,7 +26,7 @@ def command(out: Path, quick: bool, as_json: bool, seed: int) -> None:
     identified (ICING_FLIGHT_DATA names their folder; without them a simulated record stands in), and a hidden
     difference between model and aircraft, diagnosed.
     """
-    from testbed.demo import FULL, QUICK
+    from testbed.demo.demonstration import FULL, QUICK
 
     found = _run(out, seed, QUICK if quick else FULL)
     if as_json:
@@ -48,7 +48,7 @@ def _run(out: Path, seed: int, size: Size) -> Demonstration:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from testbed.demo import run
+    from testbed.demo.demonstration import run
 
     columns = (BarColumn(24), TimeElapsedColumn(), TextColumn("{task.description}"))
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:

@@ -64,7 +64,7 @@ def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tu
         if policies:
             result["policies"] = rank_policies(result, seed, status.update)
     if out is not None:
-        from testbed.diagnosis_report import write_report
+        from testbed.reports.diagnosis import write_report
 
         write_report(found, result, out)
     if as_json:

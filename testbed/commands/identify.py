@@ -15,7 +15,7 @@ from testbed.commands.common import print_json, print_table, verb
 
 if TYPE_CHECKING:
     from estimators.estimate import Estimate
-    from testbed.identify_report import Identified
+    from testbed.reports.identification import Identified
 
 EXAMPLE = """icing identify flight.csv
 icing identify doublet1.csv doublet2.csv --method hinf --start 0.4 --json
@@ -47,7 +47,7 @@ def command(records: tuple[Path, ...], name: str, mode: str, start: float, compa
     found = [identify(path, name, mode, start, compatible) for path in records]
     result = answer(found)
     if out is not None:
-        from testbed.identify_report import write
+        from testbed.reports.identification import write
 
         result["report"] = str(write(found, name, provenance(), out))
     if as_json:
@@ -78,7 +78,7 @@ def identify(path: Path, name: str, mode: str = "matched", start: float = 1.0, c
     from estimators.signals.instruments import calibrated
     from icing_env.errors import InputError
     from icing_env.record import read
-    from testbed.identify_report import Identified
+    from testbed.reports.identification import Identified
 
     options: dict[str, Any] = {}
     if name == "stepwise":

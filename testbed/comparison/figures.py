@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from controllers.policies.files import find, read
 from testbed.comparison.overview import Rows, heading
 from testbed.flight import controller
-from testbed.plot_style import GREY, ROLES, legend_above, styled
+from testbed.reports.plot_style import GREY, ROLES, legend_above, styled
 
 COLUMNS = 4
 SIGNED = ("worst_alpha_margin",)  # metrics that can be negative: intervals of the others are shown from 0 on

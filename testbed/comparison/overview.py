@@ -55,7 +55,7 @@ def overview(rows: Rows) -> list[dict[str, Any]]:
 
 
 def sentences(rows: Rows) -> list[tuple[str, str]]:
-    """What the comparison shows, each with its kind of verdict (`testbed.report.Report.verdict`)."""
+    """What the comparison shows, each with its kind of verdict (`testbed.reports.page.Report.verdict`)."""
     seen = overview(rows)
     return [*_protection(seen), *_nuisance(rows), _learned(seen)]
 

@@ -10,7 +10,7 @@ from typing import Any
 from testbed.comparison.figures import SIGNED, by_case, learning_curves
 from testbed.comparison.overview import FUNCTIONS, Rows, heading, overview, sentences, told
 from testbed.files import write_whole
-from testbed.report import Cell, Report
+from testbed.reports.page import Cell, Report
 
 OPENING = """
 Every controller flies the same drawn cases: same seeds, weather, ice and starting conditions, with ice management and

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from icing_env import scenario as scenarios
 from icing_env.errors import InputError
 from icing_env.scenario import Scenario
-from testbed.plot_style import ROLES, legend_above, styled
+from testbed.reports.plot_style import ROLES, legend_above, styled
 from testbed.reproduce.analyses import ANALYSES, PAPER
 from testbed.reproduce.cases import DEGREE, NAMES
 from testbed.reproduce.flight import PRINTED, SEEDS, Flights, fly_all

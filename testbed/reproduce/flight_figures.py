@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from icing_env import aircraft
 from icing_env import scenario as scenarios
 from testbed.flight import fly
-from testbed.plot_style import GREY, ROLES, legend_above, line, styled
+from testbed.reports.plot_style import GREY, ROLES, legend_above, line, styled
 from testbed.reproduce.flight import DEGREE, PRINTED, SEEDS, Flights, fly_all, stepwise
 from testbed.reproduce.pictures import Picture
 from testbed.reproduce.windows import Window, fly_sets

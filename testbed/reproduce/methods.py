@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from estimators.estimate import Estimate
 from estimators.hinf import record as hinf_record
-from testbed.plot_style import GREY, ROLES, styled
+from testbed.reports.plot_style import GREY, ROLES, styled
 from testbed.reproduce.analyses import ANALYSES, PAPER
 from testbed.reproduce.cases import CASES, GUST, UNITS, fly_case, values
 from testbed.reproduce.pictures import Picture

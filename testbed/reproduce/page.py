@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 
-from testbed.report import Cell, Report
+from testbed.reports.page import Cell, Report
 from testbed.reproduce.items import ITEMS
 from testbed.reproduce.pictures import Picture
 from testbed.reproduce.row import Row

@@ -9,8 +9,8 @@ from __future__ import annotations
 from estimators.estimate import Estimate
 from estimators.methods import METHODS, method
 from icing_env.record import FlightRecord, read
-from testbed.flown_again import FlownAgain, fly_again
-from testbed.identify_figures import fit_histories
+from testbed.reports.flown_again import FlownAgain, fly_again
+from testbed.reports.identification_figures import fit_histories
 from testbed.reproduce.pictures import Picture
 from testbed.reproduce.row import Row
 from testbed.textbook import folder

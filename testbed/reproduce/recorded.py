@@ -13,7 +13,7 @@ from estimators.estimate import Estimate
 from estimators.likelihood import output_error
 from estimators.methods import METHODS, method
 from icing_env.record import FlightRecord, read
-from testbed.identify_figures import methods_compared
+from testbed.reports.identification_figures import methods_compared
 from testbed.reproduce.pictures import Picture
 from testbed.reproduce.row import Row, Rule
 from testbed.textbook import BOOK, folder

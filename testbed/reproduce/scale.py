@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from estimators.compatibility.record import check_compatibility
-from testbed.plot_style import ROLES, legend_above, styled
+from testbed.reports.plot_style import ROLES, legend_above, styled
 from testbed.reproduce.analyses import ANALYSES
 from testbed.reproduce.cases import DEGREE, GUST, fly_case
 from testbed.reproduce.compatible import calibrate

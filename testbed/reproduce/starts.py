@@ -10,7 +10,7 @@ from estimators.hinf import record as hinf_record
 from estimators.observer.record import History
 from estimators.regression import equation_error
 from icing_env.record import FlightRecord, read
-from testbed.plot_style import GREY, ROLES, legend_above, line, styled
+from testbed.reports.plot_style import GREY, ROLES, legend_above, line, styled
 from testbed.reproduce.cases import NAMES, UNITS, fly_case
 from testbed.reproduce.pictures import Picture
 from testbed.reproduce.row import Row

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from testbed.flown_again import FlownAgain
-from testbed.plot_style import GREY, ROLES, legend_above, line, scale_of, styled
+from testbed.reports.flown_again import FlownAgain
+from testbed.reports.plot_style import GREY, ROLES, legend_above, line, scale_of, styled
 
 LAGS = 2.0  # s of lag shown
 COLOURS = [ROLES[name]["color"] for name in ("estimate", "iced", "protected", "unprotected", "limit", "clean")]

@@ -12,7 +12,7 @@ from sim2real.closing import gap
 from sim2real.prediction.windows import COMPARED
 from sim2real.records.channels import MEASURED
 from sim2real.where import Stretch
-from testbed.plot_style import ROLES, scale_of, styled
+from testbed.reports.plot_style import ROLES, scale_of, styled
 
 
 @styled

@@ -5,7 +5,7 @@
 * flying qualities (`testbed.flying_qualities`) of the true iced aircraft at 64 m/s without adaptation, with the
   oracle's gains, and with gains from the estimate after one doublet set flown by the autopilot in turbulence
 * attitude: steps of pitch and bank by the autopilot on the clean aircraft, the iced one, and the iced one adapted
-* altitude, airspeed and heading, split by the power there is: `testbed.tracking_study`
+* altitude, airspeed and heading, split by the power there is: `testbed.benchmarks.tracking`
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from icing_env import scenario
 from icing_env.trim import Trim, trim
 from icing_env.types import TARGET
 from icing_env.world import World
-from testbed import tracking_study
+from testbed.benchmarks import tracking
 from testbed.flight import make_world
 from testbed.flying_qualities import Qualities, level, qualities
 
@@ -157,7 +157,7 @@ def measure(quick: bool = False, progress: Callable[[str], None] = lambda what: 
         flown = attitude(who, iced, CALM, copies)
         out["attitude_error"][who] = {name: {case: float(e/clean[name][0] - 1.0) for (case, _), e in
                                              zip(iced, error, strict=True)} for name, error in flown.items()}
-    out["tracking"] = tracking_study.measure(quick, progress)
+    out["tracking"] = tracking.measure(quick, progress)
     return out
 
 
@@ -186,4 +186,4 @@ def tables(measured: dict[str, Any]) -> Iterator[tuple[str, dict[str, str], list
     yield "attitude error against the clean aircraft's, eta 0.2", {"": "left", **dict.fromkeys(cases, "right")}, [
         [f"{who}, {name}", *(f"{100*error[case]:+.0f} %" for case in cases)]
         for who, by in measured["attitude_error"].items() for name, error in by.items()]
-    yield from tracking_study.tables(measured["tracking"])
+    yield from tracking.tables(measured["tracking"])

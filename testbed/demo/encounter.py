@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icing_env.scenario import CloudPoint, Scenario, load
-from testbed.demo_fleet import ALL, LIMITS, NONE, Fleet, fly_fleet
-from testbed.demo_parts import COUNT, FOOT, Tell, Verdict, rms
+from testbed.demo.fleet import ALL, LIMITS, NONE, Fleet, fly_fleet
+from testbed.demo.parts import COUNT, FOOT, Tell, Verdict, rms
 from testbed.flight import Flight, fly
 
 MINUTE = 60.0  # s

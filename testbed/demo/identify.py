@@ -13,7 +13,7 @@ from estimators.hinf import record as hinf_record
 from estimators.regression import equation_error
 from icing_env.record import FlightRecord, read
 from icing_env.scenario import load
-from testbed.demo_parts import Tell, Verdict
+from testbed.demo.parts import Tell, Verdict
 from testbed.flight import fly
 from testbed.textbook import BOOK, folder
 

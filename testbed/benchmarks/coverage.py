@@ -1,6 +1,6 @@
 """Do the 95 % intervals of every method hold the truth? Doublet sets in calm air and in turbulence, many of each.
 
-    python -m testbed.coverage --methods output_error,filter_error --sigma 0,0.5,1,1.5 --records 200
+    python -m testbed.benchmarks.coverage --methods output_error,filter_error --sigma 0,0.5,1,1.5 --records 200
 
 Truth is the quasi-steady equivalent of `testbed.flight.quasi_steady`. A table per method and intensity: by derivative
 the share of intervals that hold the truth, the mean error and the mean half width in per cent of the truth, how often
@@ -125,7 +125,7 @@ def table(rows: Sequence[Row]) -> str:
 
 def main() -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(prog="python -m testbed.coverage", description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(prog="python -m testbed.benchmarks.coverage", description=__doc__.split("\n")[0])
     parser.add_argument("--methods", default=",".join(METHODS), help="comma-separated; all by default")
     parser.add_argument("--sigma", default="0,0.5,1,1.5", help="intensities of turbulence, m/s")
     parser.add_argument("--records", type=int, default=200, help="flights per intensity")

@@ -18,10 +18,10 @@ from sim2real.records.channels import TOLERANCE
 from sim2real.where import stretches
 from sim2real.words import of_the_model, sentences
 from testbed.commands.common import plain
-from testbed.diagnosis_figures import bars, heat, ladder_gaps, regime_heat, size_histories
-from testbed.plot_style import scale_of
-from testbed.plotting import gap_bars, time_histories
-from testbed.report import Report
+from testbed.reports.diagnosis_figures import bars, heat, ladder_gaps, regime_heat, size_histories
+from testbed.reports.page import Report
+from testbed.reports.plot_style import scale_of
+from testbed.reports.plotting import gap_bars, time_histories
 
 KIND = {"no_gap": "good", "explained": "caution", "unknown": "bad"}
 OVERLAID = ("airspeed", "alpha", "q", "theta", "ax", "az", "beta", "p", "r", "phi", "ay")

@@ -175,7 +175,7 @@ class Report:
     def html(self) -> str:
         """The whole report as one HTML document."""
         environment = jinja2.Environment(
-            loader=jinja2.PackageLoader("testbed"),
+            loader=jinja2.PackageLoader("testbed.reports"),
             autoescape=True,
             undefined=jinja2.StrictUndefined,
             trim_blocks=True,

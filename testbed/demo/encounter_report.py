@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from icing_env.display import DisplayView, draw
 from icing_env.types import MEASUREMENT
-from testbed.demo_encounter import MINUTE, Encounter, detected_at, excess_drag, verdicts
-from testbed.demo_fleet import ALL, LIMITS, Fleet
-from testbed.demo_parts import COUNT, FOOT, KNOT, write_verdicts
+from testbed.demo.encounter import MINUTE, Encounter, detected_at, excess_drag, verdicts
+from testbed.demo.fleet import ALL, LIMITS, Fleet
+from testbed.demo.parts import COUNT, FOOT, KNOT, write_verdicts
 from testbed.flight import Flight
-from testbed.plot_style import ROLES, legend_above, line, styled
-from testbed.report import Report
+from testbed.reports.page import Report
+from testbed.reports.plot_style import ROLES, legend_above, line, styled
 
 WORDS = """
 The aircraft holds at 120 knots and 9,800 ft, in a racetrack that stays in one icing cloud: for 45 minutes, as

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from controllers.choice import PROTECTIONS
+from testbed.benchmarks.encounters import DRAG, ENCOUNTERS, Tally, fly, seeds_of, world_of
+from testbed.benchmarks.speed import measured, microseconds
 from testbed.comparison.metrics import interval
-from testbed.encounters import DRAG, ENCOUNTERS, Tally, fly, seeds_of, world_of
-from testbed.speed import measured, microseconds
 
 ENCOUNTERS_EACH, QUICK, BATCH = 1000, 40, 250
 WHO: dict[str, dict[str, Any]] = {

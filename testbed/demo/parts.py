@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from testbed.report import Report
+from testbed.reports.page import Report
 
 Tell = Callable[[str, float], None]  # what is being done, and the share of it done, 0..1
 KNOT, FOOT, COUNT = 0.514444, 0.3048, 1.0e-4  # m/s, m, drag coefficient

@@ -1,7 +1,7 @@
 """Function 2 in figures: ice carried, inflations and energy, against boots and heat simply on while ice is detected.
 
-`python -m testbed.ice_protection_study` prints the table of docs/controllers.md: the same twenty-minute encounters, by
-seed, under three ways of operating the same boots and heat, and with none.
+`python -m testbed.benchmarks.ice_protection` prints the table of docs/controllers.md: the same encounters of twenty
+minutes, by seed, under three ways of operating the same boots and heat, and with none.
 """
 
 from __future__ import annotations

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icing_env.scenario import Scenario, load
-from testbed.demo_parts import Tell, Verdict, rms, write_verdicts
+from testbed.demo.parts import Tell, Verdict, rms, write_verdicts
 from testbed.flight import Flight, fly
-from testbed.plotting import estimate_history
-from testbed.report import Cell, Report
+from testbed.reports.page import Cell, Report
+from testbed.reports.plotting import estimate_history
 
 RATE = 5.0  # Hz, samples kept
 EVERY, FIRST = 150.0, 20.0  # s: a doublet set every two and a half minutes

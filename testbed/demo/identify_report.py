@@ -5,11 +5,11 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from estimators.estimate import Estimate
-from testbed.demo_identify import CLOSE, STARTS, Identified, verdicts
-from testbed.demo_parts import write_verdicts
-from testbed.plot_style import ROLES, legend_above, line, styled
-from testbed.plotting import derivative_dots
-from testbed.report import Cell, Report
+from testbed.demo.identify import CLOSE, STARTS, Identified, verdicts
+from testbed.demo.parts import write_verdicts
+from testbed.reports.page import Cell, Report
+from testbed.reports.plot_style import ROLES, legend_above, line, styled
+from testbed.reports.plotting import derivative_dots
 
 REAL = """
 NASA flew this aircraft, instrumented, in February 2002. Two of its records stand in the textbook of Klein and Morelli

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from icing_env.errors import InputError
-from testbed.diagnosis_benchmark import OPEN, answered, closed
+from testbed.benchmarks.diagnosis import OPEN, answered, closed
 from testbed.withheld.files import read_json, write_text
 from testbed.withheld.jsbsim_cases import Design, designs, write_case
 from testbed.withheld.jsbsim_edit import data_root

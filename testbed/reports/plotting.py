@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from icing_env.errors import InputError, nearest
-from testbed.plot_style import GREY, ROLES, Channels, legend_above, line, role_style, scale_of, styled
+from testbed.reports.plot_style import GREY, ROLES, Channels, legend_above, line, role_style, scale_of, styled
 
 
 @styled

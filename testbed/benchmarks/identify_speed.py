@@ -1,4 +1,4 @@
-"""How fast identification is: `python -m testbed.identify_speed` prints medians.
+"""How fast identification is: `python -m testbed.benchmarks.identify_speed` prints medians.
 
 Timed are every registered method and data compatibility on a longitudinal record of 20 s at 50 Hz, stepwise regression
 of 1,000 such records in two processes, and a step of every method that can run in flight. Medians over repetitions,

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from icing_env.errors import InputError
-from testbed.ledger import enter, enter_draw
+from testbed.benchmarks.ledger import enter, enter_draw
 from testbed.rivals import RIVALS
 from testbed.withheld.draw import DEVELOPMENT_SEED
 from testbed.withheld.files import read_json, tampered, write_text

@@ -15,16 +15,9 @@ from typing import Any
 
 import tomli_w
 
-from testbed import (
-    demo_encounter,
-    demo_encounter_report,
-    demo_gap,
-    demo_identify,
-    demo_identify_report,
-    demo_observer,
-)
-from testbed.demo_parts import Tell, Verdict
-from testbed.report import Report
+from testbed.demo import encounter, encounter_report, gap, identify, identify_report, observer
+from testbed.demo.parts import Tell, Verdict
+from testbed.reports.page import Report
 
 NEXT = """
 Everything in this report is one command or a few lines away. icing --help lists the verbs; every verb has an
@@ -97,30 +90,30 @@ def run(folder: Path, seed: int, size: Size, tell: Tell) -> Demonstration:
         tell: called with what is being done and the share of all that is done.
     """
     start = perf_counter()
-    encounter = demo_encounter.measure(seed, size.flights, _part(tell, 0.0, 0.6), size.hold)
-    observed = demo_observer.measure(seed, size.observed, _part(tell, 0.6, 0.65))
-    identified = demo_identify.measure(seed, _part(tell, 0.65, 0.7))
-    blind = demo_gap.measure(seed, folder, _part(tell, 0.7, 0.94))
+    flown = encounter.measure(seed, size.flights, _part(tell, 0.0, 0.6), size.hold)
+    observed = observer.measure(seed, size.observed, _part(tell, 0.6, 0.65))
+    identified = identify.measure(seed, _part(tell, 0.65, 0.7))
+    blind = gap.measure(seed, folder, _part(tell, 0.7, 0.94))
     tell("drawing the report", 0.94)
     report = Report("An aircraft in ice, and what can be known of it",
                     "A Twin Otter collects ice, an observer notices, the protection acts; flight records are "
                     "identified, and a hidden difference is diagnosed. Every sentence marked ✓, ! or ✕ is computed "
                     "from the flights below.",
                     provenance(seed, size))  # fmt: skip
-    demo_encounter_report.write(report, encounter)
-    demo_observer.write(report, observed)
-    demo_identify_report.write(report, identified)
-    demo_gap.write(report, blind)
+    encounter_report.write(report, flown)
+    observer.write(report, observed)
+    identify_report.write(report, identified)
+    gap.write(report, blind)
     scenario = folder / "holding_in_ice.toml"
     write_next(report, folder, scenario)
     path = report.write(folder / "report.html")
-    scenario.write_text(tomli_w.dumps(demo_encounter.HOLD), encoding="utf-8")
+    scenario.write_text(tomli_w.dumps(encounter.HOLD), encoding="utf-8")
     tell("done", 1.0)
     return Demonstration(
-        path, perf_counter() - start, {"encounter": encounter, "observer": observed, "identification": identified,
+        path, perf_counter() - start, {"encounter": flown, "observer": observed, "identification": identified,
                                        "diagnosis": blind},
-        {"encounter": demo_encounter.verdicts(encounter), "observer": demo_observer.verdicts(observed),
-         "identification": demo_identify.verdicts(identified), "diagnosis": demo_gap.verdicts(blind)})  # fmt: skip
+        {"encounter": encounter.verdicts(flown), "observer": observer.verdicts(observed),
+         "identification": identify.verdicts(identified), "diagnosis": gap.verdicts(blind)})  # fmt: skip
 
 
 def _part(tell: Tell, low: float, high: float) -> Tell:

@@ -9,7 +9,7 @@ of that Earth at the equator; what is missing then is the eastward Coriolis drif
 Left out, because they need a rotating round Earth or another aircraft: 09 and 10 (shots at 300 m/s, metres of Coriolis
 drift), 11 to 16 (an F-16 whose trim and track carry the centripetal relief of flying around the Earth).
 
-Run `python -m testbed.checkcases FOLDER`; the folder holds NASA's trajectories, `Atmos_NN_sim_MM.csv`.
+Run `python -m testbed.benchmarks.checkcases FOLDER`; the folder holds NASA's trajectories, `Atmos_NN_sim_MM.csv`.
 """
 
 from __future__ import annotations

@@ -13,10 +13,10 @@ from icing_env.scenario import load
 from sim2real.closing import gap
 from sim2real.diagnosis import Diagnosis, diagnose
 from sim2real.words import sentences
-from testbed.demo_parts import Tell, Verdict, write_verdicts
+from testbed.demo.parts import Tell, Verdict, write_verdicts
 from testbed.flight import fly
-from testbed.plotting import gap_bars
-from testbed.report import Cell, Report
+from testbed.reports.page import Cell, Report
+from testbed.reports.plotting import gap_bars
 
 DRAW, FLIGHTS = 4, 2  # stream of the draw, apart from those of the flights; one flight to diagnose, one held out
 SMALLEST, LARGEST = 0.75, 1.5  # of an effect's typical size

@@ -19,10 +19,10 @@ from estimators.observer.record import History, histories
 from estimators.regression import equation_error
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord
-from testbed.flown_again import FlownAgain, fly_again
-from testbed.identify_figures import fit_histories, methods_compared, residual_correlations
-from testbed.plotting import estimate_history
-from testbed.report import Cell, Report
+from testbed.reports.flown_again import FlownAgain, fly_again
+from testbed.reports.identification_figures import fit_histories, methods_compared, residual_correlations
+from testbed.reports.page import Cell, Report
+from testbed.reports.plotting import estimate_history
 
 DEGREE = np.pi/180.0
 AXES = {"longitudinal": ("CL_alpha", "CL_elevator", "CZ_alpha", "CZ_q", "CZ_elevator", "Cm_alpha", "Cm_q",

@@ -1,0 +1,1 @@
+"""What is measured, one subject a file: speed, protection, adaptation, diagnosis, recorded flights, coverage."""

@@ -1,0 +1,1 @@
+"""The demonstration: what the testbed does, part by part, in one report."""
