@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,27 +11,33 @@ import numpy as np
 
 from icing_env import aircraft, effects
 from icing_env.errors import InputError, nearest
-from icing_env.jit import source_hash
-from icing_env.record import DataProblem, FlightRecord
+from icing_env.record import FlightRecord
 from sim2real.actuators.surfaces import placed
 from sim2real.actuators.timing import in_step
+from sim2real.answer import credible, describe, detection_limits, judge, problems, provenance, ranked
 from sim2real.baseline.references import Baseline, fit_baseline
 from sim2real.closing import gap
-from sim2real.closing.discrepancy import Description, describe_unknown, described, in_other_form
+from sim2real.closing.discrepancy import describe_unknown, described, in_other_form
 from sim2real.closing.remedy import Remedy, leading, remedy, resimulation, values_of
+from sim2real.closing.whole_model import (
+    ANOTHER,
+    TAKEN,
+    WholeModel,
+    components_with,
+    fit_whole_model,
+    with_whole_model,
+)
 from sim2real.ladder import ladder
-from sim2real.library.candidates import SPREAD, Bank, bank, not_testable
+from sim2real.library.candidates import Bank, bank, not_testable
 from sim2real.library.terms import in_common
 from sim2real.over_time.history import SAME, History, histories
 from sim2real.planning.limits import limits
 from sim2real.planning.manoeuvre import next_manoeuvre
-from sim2real.posterior.form import at_home
-from sim2real.posterior.hypotheses import P_NONE, P_UNKNOWN, Hypothesis, Posterior
-from sim2real.posterior.singles import EffectFit
+from sim2real.posterior.hypotheses import Posterior
 from sim2real.records.instruments import with_recorder
 from sim2real.records.reconstruct import Reconstruction, reconstruct
 from sim2real.records.side_by_side import algebra_in_one_thread, each
-from sim2real.rollout import Rollout, difference, flying_as
+from sim2real.rollout import Rollout, flying_as
 from sim2real.signatures.evidence import Evidence
 from sim2real.weigh import Progress, fit
 from sim2real.where import components, regimes
@@ -124,44 +129,68 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         progress("describing the form of what was found")
         form = describe_unknown(flights, candidates, evidences, baseline, posterior.tempering, own)
     change = remedy(explained, form or (unknown if explained and explained.unknown else None))
+    whole = None if reference or simulator else _as_a_whole(flights, candidates, posterior, evidences, change, progress)
+    if whole is not None:
+        posterior, change = with_whole_model(posterior, whole), whole.remedy()
+        verdict, hypotheses = judge(posterior)
+        explained, form = leading(verdict, posterior), None
     sizes = dict[str, History]()
-    if explained is not None and explained.effects:
+    if explained is not None and explained.effects and whole is None:
         progress("looking at how the sizes went along the records")
         sizes = histories(flights, candidates, evidences, baseline, posterior, explained.fit, change)
     progress("flying what these records could have revealed")
     shown = limits(evidences, candidates, baseline, posterior.tempering, posterior.fits)
     progress("flying the records freely, before and after")
     sigma = float(np.mean([e.sigma_w for e in evidences]))
-    training = gap.together(each(lambda i, f, e: gap.energies(f, change, e.sigma_w, seed + i, change.paths),
-                                 range(len(flights)), flights, evidences))
-    tested = gap.together(each(lambda i, f: gap.energies(f, change, sigma, seed + 1000 + i, change.paths),
-                               range(len(others)), others)) if others else None
+    training = _flown_freely(flights, [e.sigma_w for e in evidences], change, seed)
+    tested = _flown_freely(others, [sigma] * len(others), change, seed + 1000) if others else None
     rungs = {"ladder": ladder(flights, others, candidates, baseline, evidences, posterior, explained, change, tested,
                               seed, progress)} if climb and tested is not None else {}  # fmt: skip
     enters_at = {name: effect.enters_at for name, effect in effects.LIBRARY.items()}
+    places = components(posterior, enters_at)
+    places = places if whole is None else components_with(places, whole)
     progress("looking for what to fly next")
     return Diagnosis(
         verdict=verdict,
         hypotheses=hypotheses,
         credible_set_95=credible([h["probability"] for h in hypotheses]),
-        where={"channels": gap.by_channel(training.before), "components": components(posterior, enters_at),
+        where={"channels": gap.by_channel(training.before), "components": places,
                "regimes": regimes(evidences)},
         effects=[describe(name, posterior, explained, form, sizes.get(name, SAME))
                  for name, p in ranked(posterior) if p >= LISTED],
         not_testable=[{"effect": name, "why": why} for name, why in sorted(untestable.items())],
         detection_limits=detection_limits(posterior.fits, shown),
-        unknown=None if unknown is None else unknown.answer(),
+        unknown=whole.answer() if whole else None if unknown is None else unknown.answer(),
         gap={"training": {"before": gap.g(training.before, training.alone),
                           "after": gap.g(training.after, training.alone)},
              "held_out": gap.held_out(tested, seed)} | rungs,
         next_manoeuvre=_next(flights[0], candidates, posterior, hypotheses, sigma),
         resimulate=resimulation(change, training, flights, evidences),
-        data_problems=[_problem(p) for f in (*flights, *others) for p in f.record.problems if not _slow(p, f.record)],
+        data_problems=problems((*flights, *others)),
         provenance=provenance(flights, others, evidences, without, len(reference), seed)
         | {"tempering": posterior.tempering, "model": baseline.answer() if reference else None},
         seconds=time.perf_counter() - began,
         details=Details(tuple(flights), tuple(others), tuple(evidences), posterior, change, training, tested),
     )
+
+
+def _flown_freely(flights: Sequence[Reconstruction], sigmas: Sequence[float], change: Remedy, seed: int) -> gap.Energy:
+    """Energies of all records under the model and under the model changed."""
+    return gap.together(each(lambda i, f, sigma: gap.energies(f, change, sigma, seed + i, change.paths),
+                             range(len(flights)), flights, sigmas))
+
+
+def _as_a_whole(flights: Sequence[Reconstruction], candidates: Bank, posterior: Posterior,
+                evidences: Sequence[Evidence], change: Remedy, progress: Progress) -> WholeModel | None:
+    """All numbers of the model fitted, where what was found leaves much, and these take most of that."""
+    if posterior.tempering <= ANOTHER:
+        return None
+    progress("fitting all numbers of the model, since what was found is not all")
+    whole = fit_whole_model(flights, candidates, posterior)
+    sigmas = [e.sigma_w for e in evidences]
+    left = [gap.g(flown.after, flown.alone)
+            for flown in (_flown_freely(flights, sigmas, some, 0) for some in (change, whole.remedy()))]
+    return whole if left[1] < TAKEN * left[0] else None
 
 
 def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, simulator: Rollout | None
@@ -178,52 +207,6 @@ def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, s
             for f, y in zip(flights, yours, strict=True)]
 
 
-def ranked(posterior: Posterior) -> list[tuple[str, float]]:
-    """Effects, the most probable first."""
-    return sorted(posterior.effects.items(), key=lambda item: -item[1])
-
-
-def judge(posterior: Posterior) -> tuple[str, list[dict[str, Any]]]:
-    """Verdict, and every hypothesis with its probability, the most probable first."""
-    found: list[dict[str, Any]] = [{"effects": list(h.effects), "unknown": h.unknown is not None,
-                                    "probability": h.probability} for h in posterior.hypotheses]
-    verdict = "no_gap" if posterior.none >= 0.5 else "unknown" if posterior.unknown >= 0.5 else "explained"
-    return verdict, found
-
-
-def credible(probabilities: Sequence[float], level: float = 0.95) -> list[int]:
-    """Indices of the fewest hypotheses that hold `level` of the probability (they come sorted)."""
-    count = int(np.searchsorted(np.cumsum(probabilities), level - 1e-12)) + 1
-    return list(range(min(count, len(probabilities))))
-
-
-def describe(name: str, posterior: Posterior, explained: Hypothesis | None = None,
-             form: Description | None = None, course: History = SAME) -> dict[str, Any]:
-    """One effect's entry: its size as in the most probable set that holds it.
-
-    Args:
-        explained, form: the explanation that the verdict rests on, and terms by which it is not the library's.
-        course: how its size went along the records.
-    """
-    fit = posterior.leading(name)
-    at = fit.effects.index(name)
-    effect, parameter = fit.families[at].effect, fit.families[at].parameter
-    shown = {p.name: {"estimate": p.neutral, "low95": p.neutral, "high95": p.neutral, "unit": p.unit}
-             for p in effect.parameters}
-    shown[parameter.name] = {"estimate": fit.estimate[at], "low95": fit.low95[at], "high95": fit.high95[at],
-                             "unit": parameter.unit}
-    return {"name": name, "probability": posterior.effects[name], "enters_at": list(effect.enters_at),
-            "parameters": shown, "indistinguishable_from": list(posterior.classes[name]), **course.answer(),
-            "other_form": form.answer() if form and explained and name in explained.effects
-                          and at_home(form.component, (name,)) else None}  # fmt: skip
-
-
-def detection_limits(fits: Mapping[str, EffectFit], shown: Mapping[str, float | None]) -> dict[str, dict[str, Any]]:
-    """Smallest size of every tested effect that would have stood out (whitened distance 3.5 from none)."""
-    return {name: {"parameter": fit.family.parameter.name, "smallest": shown[name], "unit": fit.family.parameter.unit}
-            for name, fit in fits.items()}
-
-
 def _next(flight: Reconstruction, candidates: Bank, posterior: Posterior, hypotheses: list[dict[str, Any]],
           sigma: float) -> dict[str, Any] | None:
     inside = [hypotheses[i] for i in credible([h["probability"] for h in hypotheses])]
@@ -233,40 +216,3 @@ def _next(flight: Reconstruction, candidates: Bank, posterior: Posterior, hypoth
     rivals = {n: values_of(posterior.leading(n))[n] for n in names}
     likely = posterior.effects
     return next_manoeuvre(flight, candidates, rivals, {n: max(likely[n], 1e-3) for n in names}, sigma)
-
-
-def _slow(problem: DataProblem, record: FlightRecord) -> bool:
-    """Whether samples are "missing" only because the channel runs at a lower, regular rate: no problem at all."""
-    if not problem.kind.endswith("samples missing, interpolated") or problem.channel not in record.channels:
-        return False
-    steps = np.diff(record.time[np.isfinite(record[problem.channel])])
-    return len(steps) > 0 and float(np.ptp(steps)) < 0.5 * record.dt
-
-
-def _problem(problem: DataProblem) -> dict[str, Any]:
-    return {"channel": problem.channel, "kind": problem.kind, "from": problem.start, "to": problem.end,
-            "repaired": problem.repaired}
-
-
-def provenance(flights: Sequence[Reconstruction], others: Sequence[Reconstruction], evidences: Sequence[Evidence],
-               without: tuple[str, ...], references: int, seed: int) -> dict[str, Any]:
-    """What the answer was made from."""
-    return {
-        "records": [{"sha256": content_hash(f.record), "samples": len(f.time), "rate_hz": 1.0 / f.dt,
-                     "sigma_w": e.sigma_w, "notes": list(f.notes)} for f, e in zip(flights, evidences, strict=True)],
-        "held_out": [{"sha256": content_hash(f.record), "samples": len(f.time), "notes": list(f.notes)}
-                     for f in others],
-        "simulator": [difference(f) for f in flights] if flights[0].known is not None else None,
-        "references": references, "without": list(without), "library": len(effects.LIBRARY),
-        "sources": source_hash("sim2real"), "seed": seed,
-        "assumptions": {"prior_no_gap": P_NONE, "prior_unknown": P_UNKNOWN, "baseline_spread": SPREAD},
-    }
-
-
-def content_hash(record: FlightRecord) -> str:
-    """Hash of the channels, whatever the file was called."""
-    digest = hashlib.sha256()
-    for name in sorted(record.channels):
-        digest.update(name.encode())
-        digest.update(np.ascontiguousarray(record.channels[name]).tobytes())
-    return digest.hexdigest()

@@ -12,8 +12,9 @@ from icing_env import scenario
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, RecordMeta, write
 from sim2real.actuators.timing import in_step
+from sim2real.answer import credible
 from sim2real.closing import gap
-from sim2real.diagnosis import Diagnosis, credible, diagnose
+from sim2real.diagnosis import Diagnosis, diagnose
 from sim2real.library.candidates import bank, nodes, nuisances, unbroken
 from sim2real.library.sizes import piece_prior, size_prior
 from sim2real.prediction.kalman import gains, linearise

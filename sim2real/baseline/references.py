@@ -88,31 +88,37 @@ def directions(candidates: Bank) -> tuple[Nuisance, ...]:
 
 def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank) -> Baseline:
     """The model corrected by reference flights, and the precision with which they leave it."""
-    fit = _Fit(flights, directions(candidates))
-    for k in range(ROUNDS):
-        settled = fit.step(again=k > AGAIN) < SETTLED
-        if k == AGAIN or (k > AGAIN and settled):
-            last, fit.walk = fit.walk, walk(fit.flown())
-            if k > AGAIN and fit.walk == last:
-                break
+    fit = Fit(flights, directions(candidates), np.array([_condition(float(np.median(f.channel("airspeed"))))
+                                                         for f in flights]))  # fmt: skip
+    fit.run()
     return fit.baseline(candidates)
 
 
-class _Fit:
+class Fit:
     """Values and changes of the numbers `moves`, fitted to `flights`.
 
-    x: the numbers' values, then their changes [2 n], in `moves`' units; walk: of `Inadequacy`.
+    x: the numbers' values, then their changes [2 n], in `moves`' units; precision: of x; walk: of `Inadequacy`;
+    tempering: what the evidence of the last step was divided by.
     """
 
-    def __init__(self, flights: Sequence[Reconstruction], moves: Sequence[Nuisance]) -> None:
+    def __init__(self, flights: Sequence[Reconstruction], moves: Sequence[Nuisance], at: FloatArray) -> None:
+        """Begin with the model as it is; `at`: condition that changes go with [flights], zeros for none."""
         n = len(moves)
-        self.flights, self.moves = flights, moves
-        self.at = np.array([_condition(float(np.median(f.channel("airspeed")))) for f in flights])
+        self.flights, self.moves, self.at = flights, moves, at
         self.bank = Bank(tuple(moves), (), (), 1 + n)
         self.x, self.spread = np.zeros(2 * n), np.concatenate([np.ones(n), np.full(n, CHANGES)])
         self.walk = WALKS[-1]  # while the model may still be far off
-        self.precision = np.zeros((0, 0))
+        self.precision, self.tempering = np.zeros((0, 0)), 1.0
         self.evidences: list[Evidence] = []
+
+    def run(self) -> None:
+        """Step until it settles, the process noise judged on the way."""
+        for k in range(ROUNDS):
+            settled = self.step(again=k > AGAIN) < SETTLED
+            if k == AGAIN or (k > AGAIN and settled):
+                last, self.walk = self.walk, walk(self.flown())
+                if k > AGAIN and self.walk == last:
+                    break
 
     def flown(self) -> list[Reconstruction]:
         """The flights over the model as fitted so far."""
@@ -132,10 +138,10 @@ class _Fit:
         """
         gains = [None] * len(self.flights) if again or not self.evidences else [e.gain for e in self.evidences]
         self.evidences = [gather(f, self.bank, gain) for f, gain in zip(self.flown(), gains, strict=True)]
-        information, slope, tempering = _normal(self.evidences, self.at)
+        information, slope, self.tempering = _normal(self.evidences, self.at)
         prior = np.diag(1.0 / np.maximum(self.spread, np.abs(self.x)) ** 2)
-        self.precision = information / tempering + prior
-        step = -np.linalg.solve(self.precision, slope / tempering + prior @ self.x)
+        self.precision = information / self.tempering + prior
+        step = -np.linalg.solve(self.precision, slope / self.tempering + prior @ self.x)
         self.x = self.x + step * min(1.0, LONGEST / max(float(np.max(np.abs(step))), LONGEST))
         return float(np.sqrt(step @ self.precision @ step))
 

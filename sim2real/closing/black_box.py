@@ -100,8 +100,16 @@ def plain_features(flight: Reconstruction, values: dict[str, FloatArray], k: NDA
 
 def _samples(flight: Reconstruction) -> tuple[list[FloatArray], FloatArray]:
     """Plain features now and LAGS ago of every sample, and the residual accelerations that follow [n, 6]."""
-    ahead, lags = max(1, round(AHEAD / flight.dt)), [round(lag / flight.dt) for lag in LAGS]
-    k = np.arange(max(lags), len(flight.time) - ahead - 1)
+    lags = [round(lag / flight.dt) for lag in LAGS]
+    k, lacking = residual_accelerations(flight, max(lags))
+    series = {name: flight.channel(name) for name in FEATURES}
+    return [plain_features(flight, {n: series[n][k - lag] for n in FEATURES}, k - lag) for lag in (0, *lags)], lacking
+
+
+def residual_accelerations(flight: Reconstruction, first: int = 0) -> tuple[NDArray[np.intp], FloatArray]:
+    """Samples from `first` on [n], and what rates and specific forces of the plant lack after each [n, 6]."""
+    ahead = max(1, round(AHEAD / flight.dt))
+    k = np.arange(first, len(flight.time) - ahead - 1)
     series = {name: flight.channel(name) for name in MEASURED[:11]}
     flown = Predictor(flight, np.repeat(flight.parameters, len(k)))
     values: dict[str, float | FloatArray] = {name: series[name][k] for name in MEASURED[:8]}
@@ -115,9 +123,8 @@ def _samples(flight: Reconstruction) -> tuple[list[FloatArray], FloatArray]:
         sums[:, j] = np.mean(later - read[:, :, MEASURED.index(felt)], axis=0)
     for j, name in enumerate(PUSHED[3:], start=3):
         sums[:, j] = (series[name][k + ahead] - read[-1, :, MEASURED.index(name)]) / (ahead * flight.dt)
-    blank = [not flight.has(_FELT.get(name, name)) for name in PUSHED]
-    sums[:, blank] = 0.0
-    return [plain_features(flight, {n: series[n][k - lag] for n in FEATURES}, k - lag) for lag in (0, *lags)], sums
+    sums[:, [not flight.has(_FELT.get(name, name)) for name in PUSHED]] = 0.0
+    return k, sums
 
 
 class Pushed:

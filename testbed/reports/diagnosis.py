@@ -82,15 +82,21 @@ def _explanations(report: Report, result: Mapping[str, Any]) -> None:
                           "95 % interval (shaded); dashed: one size for all records.")
     if result["unknown"]:
         _terms(report, result["unknown"], "What the library lacks")
+        if "places" in result["unknown"]:
+            report.table(["component", "changed by"], [[c, f"{v:.2f}"] for c, v in sorted(
+                result["unknown"]["places"].items(), key=lambda item: -item[1])],
+                "All numbers of the model fitted: RMS change of each force (tolerances of ax, ay, az) and moment (of "
+                "the rate that it makes in half a second).")  # fmt: skip
     for effect in result["effects"]:
         if effect["other_form"]:
             _terms(report, effect["other_form"], f"What {effect['name']} is beside the library's form of it")
 
 
 def _terms(report: Report, described: Mapping[str, Any], what: str) -> None:
+    at = f"terms of {described['component']}" if "places" not in described else "changes of the model's numbers"
     report.table(["term", "coefficient", "standard error"],
                  [[t["term"], t["coefficient"], t["std_error"]] for t in described["terms"]],
-                 f"{what}, as terms of {described['component']} ({described['kind']}).")
+                 f"{what}, as {at} ({described['kind']}).")
 
 
 def _listed(names: list[str]) -> str | None:

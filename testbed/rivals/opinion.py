@@ -12,7 +12,7 @@ from scipy.special import expit, softmax
 
 from icing_env import effects
 from icing_env.effects import Parameter
-from sim2real.diagnosis import credible
+from sim2real.answer import credible
 
 FAINTEST = 1e-6  # probability that nothing named falls below: what a rival rules out it may be wrong about (assumed)
 DESCRIBED = 0.01  # effects at least this probable are described, as in `icing diagnose`

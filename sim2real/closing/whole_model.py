@@ -1,0 +1,197 @@
+"""An aircraft that differs from its model in many numbers at once: all of them fitted to the records themselves.
+
+A few effects cannot say that another aircraft is another: what even the best of them leaves is many times the noise.
+Then the model's numbers are fitted as reference flights would fit them (`baseline.references`: every number's prior
+widens until the records no longer contradict it). If that takes most of the gap that was left in free flight, the gap
+is at every component whose force or moment the fitted numbers change by a tolerance. Numbers that an effect of the
+library changes alone, and that are plainly off, are told as that effect; the others are terms of `discrepancy`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from icing_env import effects
+from icing_env.effects.discrepancy import TERMS
+from icing_env.record import FloatArray
+from sim2real.baseline.references import Fit, directions
+from sim2real.closing.black_box import PUSHED, residual_accelerations
+from sim2real.closing.remedy import Remedy, Values
+from sim2real.library.candidates import Bank, Family, Nuisance
+from sim2real.posterior.generic import UnknownFit
+from sim2real.posterior.hypotheses import Hypothesis, Posterior
+from sim2real.posterior.sets import SetFit
+from sim2real.records.channels import TOLERANCE
+from sim2real.records.reconstruct import Reconstruction
+
+ANOTHER = 2.0  # times the noise that the best explanation leaves (tempering), beyond which it is not all (assumed)
+TAKEN = 0.5  # of the gap in free flight that it leaves: all numbers together leave at most that (assumed)
+SHARE = 0.9  # probability, at least, that it is they that differ where they do (assumed)
+SHOWN = 3.0  # standard errors from which a number is told,
+PLAIN = 2.0  # and times its published spread from which it is told as an effect (assumed)
+SEEN = 0.25  # tolerances by which a component is changed, from which its numbers are told (assumed)
+HALF = 0.5  # s in which an angular acceleration makes the rate that is compared with the tolerance
+NORMAL95 = 1.96
+PLACES = {"u": ("x_force", "ax"), "v": ("y_force", "ay"), "w": ("z_force", "az"), "p": ("rolling_moment", "p"),
+          "q": ("pitching_moment", "q"), "r": ("yawing_moment", "r")}  # fmt: skip
+COEFFICIENT = {"CX": "x_force", "CY": "y_force", "CZ": "z_force", "Cl": "rolling_moment", "Cm": "pitching_moment",
+               "Cn": "yawing_moment"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class WholeModel:
+    """Numbers of the model as the records have them.
+
+    Attributes:
+        values: what has to be put into the model, as effects.
+        named: effects of the library that are plainly there, with their sizes.
+        terms: (number, change, standard error) of the others that stand out, the surest first.
+        places: RMS change of every force (tolerances of ax, ay, az) and moment (of the rate it makes in half a second).
+        covariance: of all numbers in `values`.
+        share: probability that it is many numbers that differ, and not what was found before.
+    """
+
+    values: Values
+    named: SetFit
+    terms: tuple[tuple[str, float, float], ...]
+    places: dict[str, float]
+    covariance: FloatArray
+    share: float
+
+    @property
+    def worst(self) -> str:
+        """The component that is changed most."""
+        return max(self.places, key=lambda place: self.places[place])
+
+    def remedy(self) -> Remedy:
+        """The change of the model."""
+        return Remedy(self.values, self.covariance)
+
+    def answer(self) -> dict[str, Any]:
+        """As the interface has an unknown, with all places beside the worst."""
+        return {"component": self.worst, "kind": "static", "places": self.places,
+                "terms": [{"term": name, "coefficient": size, "std_error": error} for name, size, error in self.terms]}
+
+
+@dataclass(frozen=True)
+class _Number:
+    """A number of the model that is fitted: what changes it by `per` for each unit of a parameter of an effect.
+
+    family: of the library's effect that changes it alone; None where only `discrepancy` does.
+    """
+
+    move: Nuisance
+    effect: str
+    parameter: str
+    per: float
+    family: Family | None
+
+
+def fit_whole_model(flights: Sequence[Reconstruction], candidates: Bank, posterior: Posterior) -> WholeModel:
+    """The model's numbers as the records have them.
+
+    Args:
+        flights: the diagnosed records over the published model.
+        posterior: of the explanations tried before, tempered by more than ANOTHER.
+    """
+    numbers = _numbers(flights[0], candidates, posterior)
+    fit = Fit(flights, [n.move for n in numbers], at=np.zeros(len(flights)))
+    fit.run()
+    x, count = fit.x[: len(numbers)], len(numbers)
+    unit = np.array([n.move.factor / n.per for n in numbers])
+    covariance = np.asarray(np.linalg.inv(fit.precision)[:count, :count] * np.outer(unit, unit), np.float64)
+    size, error = x * unit, np.sqrt(np.diag(covariance))
+    values = Values()
+    for number, change in zip(numbers, size, strict=True):
+        values.setdefault(number.effect, effects.get(number.effect).neutral())[number.parameter] = float(change)
+    places = _places(flights, values)
+    surest = [i for i in np.argsort(-np.abs(size) / error) if abs(size[i]) > SHOWN * error[i]
+              and places.get(_place(numbers[i].move), 1.0) > SEEN]  # fmt: skip
+    plain = [i for i in surest if numbers[i].family is not None and abs(x[i]) > PLAIN]
+    other = [i for i in surest if i not in plain]
+    named = _set([numbers[i] for i in plain], size[plain], covariance[np.ix_(plain, plain)])
+    terms = tuple((numbers[i].move.name, float(size[i] * numbers[i].per), float(error[i] * abs(numbers[i].per)))
+                  for i in other)  # fmt: skip
+    return WholeModel(values, named, terms, places, covariance, max(SHARE, 1.0 - ANOTHER / posterior.tempering))
+
+
+def _numbers(flight: Reconstruction, candidates: Bank, posterior: Posterior) -> list[_Number]:
+    """Every number of the aircraft, not of its instruments, by an effect of the library where one changes it alone."""
+    alone = {fields: (family, per) for family in candidates.families if family.effect.name in posterior.fits
+             for fields, per in [_changed(flight, family)]}  # fmt: skip
+    out = []
+    for move in directions(candidates):
+        if move.only or move.parameter.startswith("scale_"):
+            continue
+        coefficient, _, term = move.parameter.partition("_")
+        if (found := alone.get(frozenset(move.parameter.split("+")))) is not None:
+            family, per = found
+            out.append(_Number(move, family.effect.name, family.parameter.name, per, family))
+        elif (term := term.replace("alpha2", "alpha_alpha")) in TERMS.get(coefficient, ()):
+            out.append(_Number(move, "discrepancy", f"{coefficient}_{term}", 1.0, None))
+    return out
+
+
+def _changed(flight: Reconstruction, family: Family) -> tuple[frozenset[str], float]:
+    """Fields of PARAMETERS that an effect changes by as much for each unit of its size, and how much."""
+    row, names = flight.parameters, flight.parameters.dtype.names or ()
+    rows = [effects.with_effects(row, {family.effect.name: {family.parameter.name: size}})
+            for size in (0.5 * family.nodes[0], family.nodes[0])]  # fmt: skip
+    half, whole = ({n: float(r[n][0] - row[n][0]) for n in names if r[n][0] != row[n][0]} for r in rows)
+    per = set(np.round([change / family.nodes[0] for change in whole.values()], 9))
+    straight = half.keys() == whole.keys() and np.allclose([2.0 * half[n] - whole[n] for n in whole], 0.0, atol=1e-9)
+    return (frozenset(whole), per.pop()) if straight and len(per) == 1 else (frozenset(), 1.0)
+
+
+def _set(numbers: Sequence[_Number], size: FloatArray, covariance: FloatArray) -> SetFit:
+    """Effects with their sizes, as if they had been fitted together."""
+    error = NORMAL95 * np.sqrt(np.diag(covariance))
+    return SetFit(tuple(n.family for n in numbers if n.family is not None), 0.0, tuple(size.tolist()),
+                  tuple((size - error).tolist()), tuple((size + error).tolist()), covariance)
+
+
+def _place(move: Nuisance) -> str:
+    return COEFFICIENT.get(move.parameter.partition("_")[0], "")
+
+
+def _places(flights: Sequence[Reconstruction], values: Values) -> dict[str, float]:
+    """How much the model is changed at each force and moment, both asked for the measured states."""
+    squares, count = np.zeros(len(PUSHED)), 0
+    for flight in flights:
+        changed = replace(flight, parameters=effects.with_effects(flight.parameters, values))
+        apart = residual_accelerations(flight)[1] - residual_accelerations(changed)[1]
+        squares, count = squares + np.sum(apart**2, axis=0), count + len(apart)
+    rms = dict(zip(PUSHED, np.sqrt(squares / count), strict=True))
+    return {place: float(rms[axis] * (1.0 if channel.startswith("a") else HALF) / TOLERANCE[channel])
+            for axis, (place, channel) in PLACES.items()}
+
+
+def with_whole_model(posterior: Posterior, whole: WholeModel) -> Posterior:
+    """The posterior, most of it for the effects that are plainly there beside others that the library lacks."""
+    beside = UnknownFit(whole.worst, 0.0, whole.terms, 0.0, {})
+    rest = [replace(h, probability=(1.0 - whole.share) * h.probability) for h in posterior.hypotheses]
+    found = [replace(rest[0], fit=whole.named, unknown=beside, form=None, instead=None, probability=whole.share), *rest]
+    told = dict(posterior.classes) | dict.fromkeys(whole.named.effects, ())  # each has its own interval
+    return replace(posterior, hypotheses=tuple(sorted(_merged(found), key=lambda h: -h.probability)), classes=told)
+
+
+def _merged(found: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The first of each kind, with the probability of all of it."""
+    kinds: dict[tuple[frozenset[str], bool], Hypothesis] = {}
+    for h in found:
+        kind = frozenset(h.effects), h.unknown is not None
+        kinds[kind] = replace(kinds[kind], probability=kinds[kind].probability + h.probability) if kind in kinds else h
+    return list(kinds.values())
+
+
+def components_with(found: Mapping[str, float], whole: WholeModel) -> dict[str, float]:
+    """Probabilities of components, with those that the whole model changes by a tolerance (the worst in any case)."""
+    both = dict(found)
+    for place, rms in whole.places.items():
+        if rms >= 1.0 or place == whole.worst:
+            both[place] = max(both.get(place, 0.0), whole.share)
+    return dict(sorted(both.items(), key=lambda item: -item[1]))
