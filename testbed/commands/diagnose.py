@@ -136,6 +136,11 @@ def show(found: Diagnosis, result: dict[str, Any]) -> None:
         rows.append([name, f"{hypothesis['probability']:.3f}", *(_parameter(entry) if entry else ("", "", "", ""))])
     click.echo()
     print_table("Explanations", headers, rows)
+    first = result["hypotheses"][0]["effects"]
+    if len(first) > 1:
+        click.echo()
+        print_table("Effects of the first explanation", {"effect": "left"} | dict(list(headers.items())[2:]),
+                    [[name, *_parameter(described[name])] for name in first])
     click.echo()
     channels = result["where"]["channels"]
     print_table("Gap by channel, tolerances of 14 CFR Part 60", {"channel": "left", "before": "right"},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -14,13 +15,17 @@ from sim2real.records.channels import MEASURED
 from sim2real.where import Stretch
 from testbed.reports.plot_style import ROLES, scale_of, styled
 
+LINE = 44  # characters of a name beside its bar
+
 
 @styled
 def bars(values: Mapping[str, float], label: str) -> Figure:
-    """Probabilities by name."""
-    figure = Figure(figsize=(9.2, 0.9 + 0.32 * len(values)), layout="constrained")
+    """Probabilities by name, long names on several lines."""
+    names = [fill(name, LINE) for name in values]
+    lines = sum(1 + name.count("\n") for name in names)
+    figure = Figure(figsize=(9.2, 0.9 + 0.32 * max(len(names), 0.6 * lines)), layout="constrained")
     axes = figure.subplots()
-    axes.barh(list(values), list(values.values()), 0.6, color=ROLES["estimate"]["color"])
+    axes.barh(names, list(values.values()), 0.6, color=ROLES["estimate"]["color"])
     axes.set_xlim(0.0, 1.0)
     axes.set_xlabel(label)
     axes.grid(False, axis="y")
