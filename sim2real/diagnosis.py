@@ -20,11 +20,11 @@ from sim2real.closing import gap
 from sim2real.closing.discrepancy import describe_unknown, described, in_other_form
 from sim2real.closing.remedy import Remedy, leading, remedy, resimulation, values_of
 from sim2real.closing.whole_model import (
-    ANOTHER,
     TAKEN,
     WholeModel,
     components_with,
     fit_whole_model,
+    incomplete,
     with_whole_model,
 )
 from sim2real.ladder import ladder
@@ -182,15 +182,17 @@ def _flown_freely(flights: Sequence[Reconstruction], sigmas: Sequence[float], ch
 
 def _as_a_whole(flights: Sequence[Reconstruction], candidates: Bank, posterior: Posterior,
                 evidences: Sequence[Evidence], change: Remedy, progress: Progress) -> WholeModel | None:
-    """All numbers of the model fitted, where what was found leaves much, and these take most of that."""
-    if posterior.tempering <= ANOTHER:
+    """All numbers of the model fitted, where what was found is not all, and these take most of the gap it leaves."""
+    if not incomplete(posterior, np.eye(len(candidates.nuisances))):
         return None
     progress("fitting all numbers of the model, since what was found is not all")
-    whole = fit_whole_model(flights, candidates, posterior)
     sigmas = [e.sigma_w for e in evidences]
-    left = [gap.g(flown.after, flown.alone)
-            for flown in (_flown_freely(flights, sigmas, some, 0) for some in (change, whole.remedy()))]
-    return whole if left[1] < TAKEN * left[0] else None
+    before = _flown_freely(flights, sigmas, change, 0)
+    if gap.g(before.after, before.alone) < gap.null_quantile(before.alone):
+        return None
+    whole = fit_whole_model(flights, candidates, posterior)
+    after = _flown_freely(flights, sigmas, whole.remedy(), 0)
+    return whole if gap.g(after.after, after.alone) < TAKEN * gap.g(before.after, before.alone) else None
 
 
 def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, simulator: Rollout | None

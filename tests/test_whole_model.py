@@ -77,6 +77,30 @@ def test_every_number_is_changed_as_its_effect_changes_it(records):
             assert changed[name][0] - row[name][0] == pytest.approx(size * number.per)
 
 
+def test_what_stretches_the_model_is_not_all():
+    def told(tempering: float, settled: np.ndarray | None) -> bool:
+        return whole_model.incomplete(Posterior((), {}, (), {}, np.zeros((1, 1)), tempering=tempering, settled=settled),
+                                      np.eye(30))  # fmt: skip
+
+    assert told(3.0, None) and not told(1.0, None)
+    assert not told(1.0, np.ones(30)) and told(1.0, np.full(30, 1.8))
+
+
+@pytest.mark.slow
+def test_numbers_that_one_pair_and_a_stretched_model_explain_are_told_too():
+    sizes = {"aileron_power": 0.4, "dihedral_effect": 0.35, "lift_slope": 0.2, "pitch_trim": -0.036, "side_force": 0.4}
+    changes = {name: {next(iter(effects.get(name).neutral())): size} for name, size in sizes.items()}
+    other = {"discrepancy": {**effects.get("discrepancy").neutral(), "CY_rudder": 0.2, "CY_r": 0.4, "CZ_0": -0.09}}
+    flown = scenario.load("clear_air", duration=52.0, effects=changes | other)
+    records = [fly(flown, seed=seed, protection=False, observer=False).record for seed in (5, 6)]
+    found = diagnose(records[:1], records[1:])
+    assert found.provenance["tempering"] < whole_model.ANOTHER
+    likely = [e for e in found.effects if e["probability"] > 0.5]
+    told = {e["name"]: next(iter(e["parameters"].values()))["estimate"] for e in likely}
+    assert told == pytest.approx({n: s for n, s in sizes.items() if n != "side_force"}, rel=0.1)  # beta hardly moves
+    assert found.gap["held_out"]["closure"] > 0.85
+
+
 def test_probabilities_stay_a_distribution():
     before = Posterior(normalised([Hypothesis(SetFit(), None, -0.1, 3.0), Hypothesis(SetFit(), None, -0.2, 1.0)], 0.0),
                        {}, (), {}, np.zeros((1, 1)), tempering=20.0)

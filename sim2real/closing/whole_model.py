@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.stats import chi2
 
 from icing_env import effects
 from icing_env.effects.discrepancy import TERMS
@@ -29,6 +30,7 @@ from sim2real.records.channels import TOLERANCE
 from sim2real.records.reconstruct import Reconstruction
 
 ANOTHER = 2.0  # times the noise that the best explanation leaves (tempering), beyond which it is not all (assumed)
+STRETCHED = 1e-3  # chance of numbers as far from published ones as those that go with it, at which it is not all, too
 TAKEN = 0.5  # of the gap in free flight that it leaves: all numbers together leave at most that (assumed)
 SHARE = 0.9  # probability, at least, that it is they that differ where they do (assumed)
 SHOWN = 3.0  # standard errors from which a number is told,
@@ -91,12 +93,25 @@ class _Number:
     family: Family | None
 
 
+def incomplete(posterior: Posterior, precision: FloatArray) -> bool:
+    """Whether the best explanation leaves much, or takes numbers of the model along that are too far off.
+
+    Args:
+        precision: of the nuisances, prior [n, n].
+    """
+    if posterior.tempering > ANOTHER:
+        return True
+    if posterior.settled is None:
+        return False
+    return float(posterior.settled @ precision @ posterior.settled) > chi2.isf(STRETCHED, len(precision))
+
+
 def fit_whole_model(flights: Sequence[Reconstruction], candidates: Bank, posterior: Posterior) -> WholeModel:
     """The model's numbers as the records have them.
 
     Args:
         flights: the diagnosed records over the published model.
-        posterior: of the explanations tried before, tempered by more than ANOTHER.
+        posterior: of the explanations tried before.
     """
     numbers = _numbers(flights[0], candidates, posterior)
     fit = Fit(flights, [n.move for n in numbers], at=np.zeros(len(flights)))
