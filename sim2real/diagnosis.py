@@ -20,6 +20,7 @@ from sim2real.closing import gap
 from sim2real.closing.discrepancy import describe_unknown, described, in_other_form
 from sim2real.closing.remedy import Remedy, leading, remedy, resimulation, values_of
 from sim2real.closing.whole_model import (
+    ANOTHER,
     TAKEN,
     WholeModel,
     components_with,
@@ -149,6 +150,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     enters_at = {name: effect.enters_at for name, effect in effects.LIBRARY.items()}
     places = components(posterior, enters_at)
     places = places if whole is None else components_with(places, whole)
+    lacking = whole or unknown
     progress("looking for what to fly next")
     return Diagnosis(
         verdict=verdict,
@@ -160,7 +162,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
                  for name, p in ranked(posterior) if p >= LISTED],
         not_testable=[{"effect": name, "why": why} for name, why in sorted(untestable.items())],
         detection_limits=detection_limits(posterior.fits, shown),
-        unknown=whole.answer() if whole else None if unknown is None else unknown.answer(),
+        unknown=None if lacking is None else lacking.answer(),
         gap={"training": {"before": gap.g(training.before, training.alone),
                           "after": gap.g(training.after, training.alone)},
              "held_out": gap.held_out(tested, seed)} | rungs,
@@ -188,8 +190,8 @@ def _as_a_whole(flights: Sequence[Reconstruction], candidates: Bank, posterior: 
     progress("fitting all numbers of the model, since what was found is not all")
     sigmas = [e.sigma_w for e in evidences]
     before = _flown_freely(flights, sigmas, change, 0)
-    if gap.g(before.after, before.alone) < gap.null_quantile(before.alone):
-        return None
+    if posterior.tempering <= ANOTHER and gap.g(before.after, before.alone) < gap.null_quantile(before.alone):
+        return None  # what stretches the model leaves nothing in free flight
     whole = fit_whole_model(flights, candidates, posterior)
     after = _flown_freely(flights, sigmas, whole.remedy(), 0)
     return whole if gap.g(after.after, after.alone) < TAKEN * gap.g(before.after, before.alone) else None

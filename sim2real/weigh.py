@@ -31,6 +31,7 @@ from sim2real.signatures.tempering import noise, temper, total
 RELINEARISE = 8.0  # whitened distance of the fitted nuisances beyond which all is flown again about them
 AGAIN = 2  # times at most
 PLAIN, GUESSES = 20.0, 4  # log evidence by which an effect is plain to see, and how many of these are flown
+LOSES = 1.1  # times what the best explanation left, that it leaves with gains found with it: it lost the record
 CALMER = 0.6  # ratio of temperings below which the leading explanations are flown again
 Progress = Callable[[str], None]
 
@@ -64,9 +65,7 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
     if leading(found.posterior):
         progress("flying the leading explanations where they were fitted")
         found.refine()
-        if found.judged_anew():
-            progress("flying the leading explanations again, gusts and remainder judged with them")
-            found.refine()
+        found.refine_anew(progress)
     posterior = varying(flights, candidates, found.evidences, baseline, found.posterior, found.centre)
     return found.evidences, replace(posterior, hypotheses=doubted(normalised(posterior.hypotheses)))
 
@@ -193,6 +192,17 @@ class _Weighing:
     def refine(self) -> None:
         """Fly the leading explanations where they lie."""
         self.posterior = refine(self._flying(), self.start, self.posterior, self.places)
+
+    def refine_anew(self, progress: Progress) -> None:
+        """The same with the gains and the tempering of what was best, unless that is lost with them."""
+        before, best = dict(vars(self)), self.posterior.best
+        if not self.judged_anew():
+            return
+        progress("flying the leading explanations again, gusts and remainder judged with them")
+        self.refine()
+        again = [h.fit.misfit for h in self.posterior.hypotheses if h.unknown is None and h.effects == best.effects]
+        if again and again[0] * self.posterior.tempering > LOSES * best.fit.misfit * before["posterior"].tempering:
+            vars(self).update(before)
 
     def judged_anew(self) -> bool:
         """Weigh anew with the gains and the tempering of the best explanation flown, where these are others."""

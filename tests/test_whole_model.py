@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -101,6 +103,10 @@ def test_numbers_that_one_pair_and_a_stretched_model_explain_are_told_too():
     assert found.gap["held_out"]["closure"] > 0.85
 
 
+def fit_of(name: str) -> tuple:
+    return tuple(f for f in bank().families if f.effect.name == name)[:1]
+
+
 def test_probabilities_stay_a_distribution():
     before = Posterior(normalised([Hypothesis(SetFit(), None, -0.1, 3.0), Hypothesis(SetFit(), None, -0.2, 1.0)], 0.0),
                        {}, (), {}, np.zeros((1, 1)), tempering=20.0)
@@ -108,4 +114,6 @@ def test_probabilities_stay_a_distribution():
     after = whole_model.with_whole_model(before, whole)
     assert sum(h.probability for h in after.hypotheses) == pytest.approx(1.0)
     assert after.unknown == pytest.approx(0.9) and after.none == pytest.approx(0.1)
+    named = replace(whole, named=SetFit(fit_of("side_force"), 0.0, (0.4,), (0.3,), (0.5,)))
+    assert whole_model.with_whole_model(before, named).unknown == 0.0  # nothing stands out beside it
     assert whole_model.components_with({"z_force": 0.2}, whole) == {"y_force": 0.9, "z_force": 0.2}

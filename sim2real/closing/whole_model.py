@@ -3,8 +3,8 @@
 A few effects cannot say that another aircraft is another: what even the best of them leaves is many times the noise.
 Then the model's numbers are fitted as reference flights would fit them (`baseline.references`: every number's prior
 widens until the records no longer contradict it). If that takes most of the gap that was left in free flight, the gap
-is at every component whose force or moment the fitted numbers change by a tolerance. Numbers that an effect of the
-library changes alone, and that are plainly off, are told as that effect; the others are terms of `discrepancy`.
+is at every component whose force or moment the fitted numbers change by a tolerance. Numbers that are plainly off are
+told: as the effect of the library that changes them alone, else as terms of `discrepancy`.
 """
 
 from __future__ import annotations
@@ -33,8 +33,7 @@ ANOTHER = 2.0  # times the noise that the best explanation leaves (tempering), b
 STRETCHED = 1e-3  # chance of numbers as far from published ones as those that go with it, at which it is not all, too
 TAKEN = 0.5  # of the gap in free flight that it leaves: all numbers together leave at most that (assumed)
 SHARE = 0.9  # probability, at least, that it is they that differ where they do (assumed)
-SHOWN = 3.0  # standard errors from which a number is told,
-PLAIN = 2.0  # and times its published spread from which it is told as an effect (assumed)
+SHOWN, PLAIN = 3.0, 2.0  # standard errors, and times its published spread, from which a number is told (assumed)
 SEEN = 0.25  # tolerances by which a component is changed, from which its numbers are told (assumed)
 HALF = 0.5  # s in which an angular acceleration makes the rate that is compared with the tolerance
 NORMAL95 = 1.96
@@ -125,9 +124,9 @@ def fit_whole_model(flights: Sequence[Reconstruction], candidates: Bank, posteri
         values.setdefault(number.effect, effects.get(number.effect).neutral())[number.parameter] = float(change)
     places = _places(flights, values)
     surest = [i for i in np.argsort(-np.abs(size) / error) if abs(size[i]) > SHOWN * error[i]
-              and places.get(_place(numbers[i].move), 1.0) > SEEN]  # fmt: skip
-    plain = [i for i in surest if numbers[i].family is not None and abs(x[i]) > PLAIN]
-    other = [i for i in surest if i not in plain]
+              and abs(x[i]) > PLAIN and places.get(_place(numbers[i].move), 1.0) > SEEN]  # fmt: skip
+    plain = [i for i in surest if numbers[i].family is not None]
+    other = [i for i in surest if numbers[i].family is None]
     named = _set([numbers[i] for i in plain], size[plain], covariance[np.ix_(plain, plain)])
     terms = tuple((numbers[i].move.name, float(size[i] * numbers[i].per), float(error[i] * abs(numbers[i].per)))
                   for i in other)  # fmt: skip
@@ -186,8 +185,8 @@ def _places(flights: Sequence[Reconstruction], values: Values) -> dict[str, floa
 
 
 def with_whole_model(posterior: Posterior, whole: WholeModel) -> Posterior:
-    """The posterior, most of it for the effects that are plainly there beside others that the library lacks."""
-    beside = UnknownFit(whole.worst, 0.0, whole.terms, 0.0, {})
+    """The posterior, most of it for the effects that are plainly there, and what the library lacks if there is any."""
+    beside = UnknownFit(whole.worst, 0.0, whole.terms, 0.0, {}) if whole.terms or not whole.named.effects else None
     rest = [replace(h, probability=(1.0 - whole.share) * h.probability) for h in posterior.hypotheses]
     found = [replace(rest[0], fit=whole.named, unknown=beside, form=None, instead=None, probability=whole.share), *rest]
     told = dict(posterior.classes) | dict.fromkeys(whole.named.effects, ())  # each has its own interval
