@@ -30,7 +30,7 @@ from sim2real.records.channels import TOLERANCE
 from sim2real.records.reconstruct import Reconstruction
 
 ANOTHER = 2.0  # times the noise that the best explanation leaves (tempering), beyond which it is not all (assumed)
-STRETCHED = 1e-3  # chance of numbers as far from published ones as those that go with it, at which it is not all, too
+STRETCHED = 1e-5  # chance of numbers as far from published ones as those that go with it, at which it is not all, too
 TAKEN = 0.5  # of the gap in free flight that it leaves: all numbers together leave at most that (assumed)
 SHARE = 0.9  # probability, at least, that it is they that differ where they do (assumed)
 SHOWN, PLAIN = 3.0, 2.0  # standard errors, and times its published spread, from which a number is told (assumed)
