@@ -20,12 +20,10 @@ from sim2real.closing import gap
 from sim2real.closing.discrepancy import describe_unknown, described, in_other_form
 from sim2real.closing.remedy import Remedy, leading, remedy, resimulation, values_of
 from sim2real.closing.whole_model import (
-    ANOTHER,
-    TAKEN,
-    WholeModel,
     components_with,
     fit_whole_model,
     incomplete,
+    takes_most,
     with_whole_model,
 )
 from sim2real.ladder import ladder
@@ -130,26 +128,33 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         progress("describing the form of what was found")
         form = describe_unknown(flights, candidates, evidences, baseline, posterior.tempering, own)
     change = remedy(explained, form or (unknown if explained and explained.unknown else None))
-    whole = None if reference or simulator else _as_a_whole(flights, candidates, posterior, evidences, change, progress)
-    if whole is not None:
-        posterior, change = with_whole_model(posterior, whole), whole.remedy()
-        verdict, hypotheses = judge(posterior)
-        explained, form = leading(verdict, posterior), None
+    progress("flying the records freely, before and after")
+    sigmas = [e.sigma_w for e in evidences]
+    training = _flown_freely(flights, sigmas, change, seed)
+    whole = None
+    if not (reference or simulator) and incomplete(posterior, training):
+        progress("fitting all numbers of the model, since what was found is not all")
+        fitted = fit_whole_model(flights, candidates, posterior)
+        closer = _flown_freely(flights, sigmas, fitted.remedy(), seed)
+        if takes_most(training, closer):
+            whole, training = fitted, closer
+            posterior, change = with_whole_model(posterior, whole), whole.remedy()
+            verdict, hypotheses = judge(posterior)
+            explained, form = leading(verdict, posterior), None
     sizes = dict[str, History]()
     if explained is not None and explained.effects and whole is None:
         progress("looking at how the sizes went along the records")
         sizes = histories(flights, candidates, evidences, baseline, posterior, explained.fit, change)
     progress("flying what these records could have revealed")
     shown = limits(evidences, candidates, baseline, posterior.tempering, posterior.fits)
-    progress("flying the records freely, before and after")
-    sigma = float(np.mean([e.sigma_w for e in evidences]))
-    training = _flown_freely(flights, [e.sigma_w for e in evidences], change, seed)
+    sigma = float(np.mean(sigmas))
     tested = _flown_freely(others, [sigma] * len(others), change, seed + 1000) if others else None
     rungs = {"ladder": ladder(flights, others, candidates, baseline, evidences, posterior, explained, change, tested,
                               seed, progress)} if climb and tested is not None else {}  # fmt: skip
     enters_at = {name: effect.enters_at for name, effect in effects.LIBRARY.items()}
     places = components(posterior, enters_at)
-    places = places if whole is None else components_with(places, whole)
+    if whole is not None:
+        places = components_with(places, whole)
     lacking = whole or unknown
     progress("looking for what to fly next")
     return Diagnosis(
@@ -180,21 +185,6 @@ def _flown_freely(flights: Sequence[Reconstruction], sigmas: Sequence[float], ch
     """Energies of all records under the model and under the model changed."""
     return gap.together(each(lambda i, f, sigma: gap.energies(f, change, sigma, seed + i, change.paths),
                              range(len(flights)), flights, sigmas))
-
-
-def _as_a_whole(flights: Sequence[Reconstruction], candidates: Bank, posterior: Posterior,
-                evidences: Sequence[Evidence], change: Remedy, progress: Progress) -> WholeModel | None:
-    """All numbers of the model fitted, where what was found is not all, and these take most of the gap it leaves."""
-    if not incomplete(posterior, np.eye(len(candidates.nuisances))):
-        return None
-    progress("fitting all numbers of the model, since what was found is not all")
-    sigmas = [e.sigma_w for e in evidences]
-    before = _flown_freely(flights, sigmas, change, 0)
-    if posterior.tempering <= ANOTHER and gap.g(before.after, before.alone) < gap.null_quantile(before.alone):
-        return None  # what stretches the model leaves nothing in free flight
-    whole = fit_whole_model(flights, candidates, posterior)
-    after = _flown_freely(flights, sigmas, whole.remedy(), 0)
-    return whole if gap.g(after.after, after.alone) < TAKEN * gap.g(before.after, before.alone) else None
 
 
 def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, simulator: Rollout | None

@@ -34,25 +34,23 @@ def _finding(found: Diagnosis) -> str:
     sure = f"probability {first['probability']:.2f}"
     if found.verdict == "no_gap":
         return f"The records show no gap beyond the model's own uncertainty ({sure})."
+    named = [_named(next(e for e in found.effects if e["name"] == name)) for name in first["effects"]]
     if found.unknown and "places" in found.unknown and first["unknown"]:
-        return _another_aircraft(found, sure)
+        return _another_aircraft(found.unknown, named, sure)
     if found.verdict == "unknown" and not first["effects"]:
         where = found.unknown["component"] if found.unknown else "nowhere in particular"
         return f"There is a gap that nothing in the library explains; it enters at {where} ({sure})."
     if not first["effects"]:
         return "There is a gap, but no single explanation stands out."
-    named = [_named(next(e for e in found.effects if e["name"] == name)) for name in first["effects"]]
     beside = ["something that the library lacks"] if first["unknown"] else []
     return f"The gap is best explained by {' and '.join(named + beside)} ({sure})."
 
 
-def _another_aircraft(found: Diagnosis, sure: str) -> str:
+def _another_aircraft(unknown: dict[str, Any], named: list[str], sure: str) -> str:
     """A gap in many numbers at once: where, and what each is."""
-    assert found.unknown is not None
-    places = sorted(((c, rms) for c, rms in found.unknown["places"].items() if rms >= 1.0), key=lambda item: -item[1])
+    places = sorted(((c, rms) for c, rms in unknown["places"].items() if rms >= 1.0), key=lambda item: -item[1])
     where = ", ".join(f"{c} {rms:.1f}" for c, rms in places)
-    named = [_named(next(e for e in found.effects if e["name"] == name)) for name in found.hypotheses[0]["effects"]]
-    others = ", ".join(t["term"].split("+")[0] for t in found.unknown["terms"][:6])
+    others = ", ".join(t["term"] for t in unknown["terms"][:6])
     also = [f"numbers that no effect of the library changes ({others})"] * bool(others)
     return (f"The aircraft differs from the model in many numbers at once ({sure}), in tolerances: "
             f"{where or 'less than one anywhere'}; it has {', '.join(named + also)}.")

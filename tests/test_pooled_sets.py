@@ -20,12 +20,10 @@ def a_set(folder: Path, right: int, wrong: int, sources: str = "one solver", **c
     folder.mkdir()
     pairs = [(answer([RIGHT if i < right else WRONG]) | {"provenance": {"sources": sources}},
               key("single", [RIGHT], 0.0)) for i in range(right + wrong)]  # fmt: skip
-    write(folder, pairs)
-    names = [f"{folder.name}_{i}" for i in range(len(pairs))]
+    answers, _ = write(folder, pairs, prefix=folder.name)
+    names = [path.stem for path in answers.iterdir()]
     (folder / "refly").mkdir()
-    for i, name in enumerate(names):
-        for part in ("answers", "keys"):
-            (folder / part / f"c{i:03}.json").rename(folder / part / f"{name}.json")
+    for name in names:
         (folder / "refly" / f"{name}.json").write_text(json.dumps({"after": 0.1, "own_after": 0.1}))
         (folder / "records" / name).mkdir(parents=True)
         (folder / "records" / name / "1.csv").write_text("time\n0.0\n")
@@ -53,13 +51,13 @@ def test_only_whole_sets_of_one_solver_and_kind_are_scored_together(tmp_path):
 
 @pytest.mark.parametrize("part", ["answers", "refly"])
 def test_a_set_whose_run_has_not_ended_is_not_scored(tmp_path, part):
-    (a_set(tmp_path / "a", 2, 0) / part / "a_1.json").unlink()
-    with pytest.raises(InputError, match=f"1 files are not there, the first is {part}/a_1.json"):
+    (a_set(tmp_path / "a", 2, 0) / part / "a001.json").unlink()
+    with pytest.raises(InputError, match=f"1 files are not there, the first is {part}/a001.json"):
         pooled([tmp_path / "a"])
 
 
 def test_changed_keys_are_told(tmp_path):
-    changed = a_set(tmp_path / "a", 2, 0) / "keys" / "a_0.json"
+    changed = a_set(tmp_path / "a", 2, 0) / "keys" / "a000.json"
     changed.write_text(changed.read_text().replace(RIGHT, WRONG))
-    with pytest.raises(InputError, match="1 cases are not those of the manifest, the first is a_0"):
+    with pytest.raises(InputError, match="1 cases are not those of the manifest, the first is a000"):
         pooled([tmp_path / "a"])

@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from test_devices import one
 
 from icing_env import effects, scenario
 from icing_env.aircraft import load
-from sim2real.closing import whole_model
+from icing_env.record import FlightRecord
+from sim2real.closing import gap, whole_model
 from sim2real.diagnosis import diagnose
 from sim2real.library.candidates import bank
 from sim2real.posterior.hypotheses import Hypothesis, Posterior, normalised
@@ -24,13 +26,18 @@ SIZES = {"side_force": 0.45, "aileron_power": 0.5, "dihedral_effect": 0.45, "lif
 OTHERS = {"CY_r": 0.5, "CY_rudder": 0.21, "CY_p": 0.22, "CY_0": -0.07, "CZ_0": -0.14, "CX_alpha": 0.2, "Cl_r": 0.09}
 
 
+def flown(sizes: dict[str, float], others: dict[str, float]) -> list[FlightRecord]:
+    """Two flights of an aircraft with effects of some sizes and other numbers changed."""
+    changes = {name: {next(iter(effects.get(name).neutral())): size} for name, size in sizes.items()}
+    other = {"discrepancy": {**effects.get("discrepancy").neutral(), **others}}
+    chosen = scenario.load("clear_air", duration=52.0, effects=changes | other)
+    return [fly(chosen, seed=seed, protection=False, observer=False).record for seed in (5, 6)]
+
+
 @pytest.fixture(scope="module")
 def records():
-    """Two flights of an aircraft that differs from the model in thirteen numbers."""
-    changes = {name: {next(iter(effects.get(name).neutral())): size} for name, size in SIZES.items()}
-    other = {"discrepancy": {**effects.get("discrepancy").neutral(), **OTHERS}}
-    flown = scenario.load("clear_air", duration=52.0, effects=changes | other)
-    return [fly(flown, seed=seed, protection=False, observer=False).record for seed in (5, 6)]
+    """An aircraft that differs from the model in thirteen numbers."""
+    return flown(SIZES, OTHERS)
 
 
 @pytest.fixture(scope="module")
@@ -80,31 +87,28 @@ def test_every_number_is_changed_as_its_effect_changes_it(records):
 
 
 def test_what_stretches_the_model_is_not_all():
-    def told(tempering: float, settled: np.ndarray | None) -> bool:
-        return whole_model.incomplete(Posterior((), {}, (), {}, np.zeros((1, 1)), tempering=tempering, settled=settled),
-                                      np.eye(30))  # fmt: skip
+    noise = np.random.default_rng(0).chisquare(4.0, (20, 6, 12)) / 4.0
+    much, none = (gap.Energy(noise[0], noise[0] + more, noise, np.zeros((6, 1))) for more in (5.0, 0.0))
+
+    def told(tempering: float, settled: np.ndarray | None, left: gap.Energy = much) -> bool:
+        found = Posterior((), {}, (), {}, np.zeros((1, 1)), tempering=tempering, settled=settled)
+        return whole_model.incomplete(found, left)
 
     assert told(3.0, None) and not told(1.0, None)
     assert not told(1.0, np.ones(30)) and told(1.0, np.full(30, 1.8))
+    assert told(3.0, None, none) and not told(1.0, np.full(30, 1.8), none)  # nothing is left in free flight
 
 
 @pytest.mark.slow
 def test_numbers_that_one_pair_and_a_stretched_model_explain_are_told_too():
     sizes = {"aileron_power": 0.4, "dihedral_effect": 0.35, "lift_slope": 0.2, "pitch_trim": -0.036, "side_force": 0.4}
-    changes = {name: {next(iter(effects.get(name).neutral())): size} for name, size in sizes.items()}
-    other = {"discrepancy": {**effects.get("discrepancy").neutral(), "CY_rudder": 0.2, "CY_r": 0.4, "CZ_0": -0.09}}
-    flown = scenario.load("clear_air", duration=52.0, effects=changes | other)
-    records = [fly(flown, seed=seed, protection=False, observer=False).record for seed in (5, 6)]
+    records = flown(sizes, {"CY_rudder": 0.2, "CY_r": 0.4, "CZ_0": -0.09})
     found = diagnose(records[:1], records[1:])
     assert found.provenance["tempering"] < whole_model.ANOTHER
     likely = [e for e in found.effects if e["probability"] > 0.5]
     told = {e["name"]: next(iter(e["parameters"].values()))["estimate"] for e in likely}
     assert told == pytest.approx({n: s for n, s in sizes.items() if n != "side_force"}, rel=0.1)  # beta hardly moves
     assert found.gap["held_out"]["closure"] > 0.85
-
-
-def fit_of(name: str) -> tuple:
-    return tuple(f for f in bank().families if f.effect.name == name)[:1]
 
 
 def test_probabilities_stay_a_distribution():
@@ -114,6 +118,6 @@ def test_probabilities_stay_a_distribution():
     after = whole_model.with_whole_model(before, whole)
     assert sum(h.probability for h in after.hypotheses) == pytest.approx(1.0)
     assert after.unknown == pytest.approx(0.9) and after.none == pytest.approx(0.1)
-    named = replace(whole, named=SetFit(fit_of("side_force"), 0.0, (0.4,), (0.3,), (0.5,)))
+    named = replace(whole, named=replace(one("side_force"), estimate=(0.4,), low95=(0.3,), high95=(0.5,)))
     assert whole_model.with_whole_model(before, named).unknown == 0.0  # nothing stands out beside it
     assert whole_model.components_with({"z_force": 0.2}, whole) == {"y_force": 0.9, "z_force": 0.2}

@@ -33,12 +33,12 @@ def answer(parts: list[str], unknown: bool = False, p: float = 0.97, near: tuple
                         for n in parts], "gap": {"held_out": {"closure": 0.9 if parts else None}}}  # fmt: skip
 
 
-def write(folder: Path, pairs: list[tuple[dict, dict]]) -> tuple[Path, Path]:
+def write(folder: Path, pairs: list[tuple[dict, dict]], prefix: str = "c") -> tuple[Path, Path]:
     for part in ("answers", "keys"):
         (folder / part).mkdir()
     for i, (told, true) in enumerate(pairs):
-        (folder / "answers" / f"c{i:03}.json").write_text(json.dumps(told))
-        (folder / "keys" / f"c{i:03}.json").write_text(json.dumps(true))
+        (folder / "answers" / f"{prefix}{i:03}.json").write_text(json.dumps(told))
+        (folder / "keys" / f"{prefix}{i:03}.json").write_text(json.dumps(true))
     return folder / "answers", folder / "keys"
 
 

@@ -97,8 +97,7 @@ def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank) -> Baselin
 class Fit:
     """Values and changes of the numbers `moves`, fitted to `flights`.
 
-    x: the numbers' values, then their changes [2 n], in `moves`' units; precision: of x; walk: of `Inadequacy`;
-    tempering: what the evidence of the last step was divided by.
+    x: the numbers' values, then their changes [2 n], in `moves`' units; precision: of x; walk: of `Inadequacy`.
     """
 
     def __init__(self, flights: Sequence[Reconstruction], moves: Sequence[Nuisance], at: FloatArray) -> None:
@@ -108,7 +107,7 @@ class Fit:
         self.bank = Bank(tuple(moves), (), (), 1 + n)
         self.x, self.spread = np.zeros(2 * n), np.concatenate([np.ones(n), np.full(n, CHANGES)])
         self.walk = WALKS[-1]  # while the model may still be far off
-        self.precision, self.tempering = np.zeros((0, 0)), 1.0
+        self.precision = np.zeros((0, 0))
         self.evidences: list[Evidence] = []
 
     def run(self) -> None:
@@ -138,10 +137,10 @@ class Fit:
         """
         gains = [None] * len(self.flights) if again or not self.evidences else [e.gain for e in self.evidences]
         self.evidences = [gather(f, self.bank, gain) for f, gain in zip(self.flown(), gains, strict=True)]
-        information, slope, self.tempering = _normal(self.evidences, self.at)
+        information, slope, tempering = _normal(self.evidences, self.at)
         prior = np.diag(1.0 / np.maximum(self.spread, np.abs(self.x)) ** 2)
-        self.precision = information / self.tempering + prior
-        step = -np.linalg.solve(self.precision, slope / self.tempering + prior @ self.x)
+        self.precision = information / tempering + prior
+        step = -np.linalg.solve(self.precision, slope / tempering + prior @ self.x)
         self.x = self.x + step * min(1.0, LONGEST / max(float(np.max(np.abs(step))), LONGEST))
         return float(np.sqrt(step @ self.precision @ step))
 

@@ -27,7 +27,7 @@ BLOCKS = 6
 STRENGTHS = tuple(np.geomspace(1e-3, 1e4, 15))  # of the ridge, per sample
 FEATURES = ("alpha", "beta", "p", "q", "r", "airspeed")
 PUSHED = ("u", "v", "w", "p", "q", "r")
-_FELT = {"u": "ax", "v": "ay", "w": "az"}
+FELT = {"u": "ax", "v": "ay", "w": "az"}
 _COLUMN = np.array([TANGENT.index(name) for name in PUSHED])
 
 
@@ -118,12 +118,12 @@ def residual_accelerations(flight: Reconstruction, first: int = 0) -> tuple[NDAr
     sums = np.zeros((len(k), 6))
     read = flown.fly(ahead, k)
     for j, name in enumerate(PUSHED[:3]):
-        felt = _FELT[name]
+        felt = FELT[name]
         later = np.stack([series[felt][k + m + 1] for m in range(ahead)])
         sums[:, j] = np.mean(later - read[:, :, MEASURED.index(felt)], axis=0)
     for j, name in enumerate(PUSHED[3:], start=3):
         sums[:, j] = (series[name][k + ahead] - read[-1, :, MEASURED.index(name)]) / (ahead * flight.dt)
-    sums[:, [not flight.has(_FELT.get(name, name)) for name in PUSHED]] = 0.0
+    sums[:, [not flight.has(FELT.get(name, name)) for name in PUSHED]] = 0.0
     return k, sums
 
 

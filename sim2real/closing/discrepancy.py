@@ -20,6 +20,7 @@ from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.baseline.references import Baseline
 from sim2real.flown.settling import nearer
+from sim2real.library.bends import COMPONENTS
 from sim2real.library.candidates import Bank, Nuisance, shifted
 from sim2real.library.terms import DEVIATION, FROM_ZERO, GENERIC, GENERIC_SIZE, unit_of
 from sim2real.posterior.attribution import nuisance_mean, reduce, with_prior
@@ -36,8 +37,7 @@ ROUNDS, SETTLED = 8, 0.5  # of fitting at most, each flying the aircraft describ
 RIDGE = 0.1  # prior precision of a term in its own unit (assumed: a standard deviation of three)
 LATE = ("_dot", "acceleration", "slow_phi", "slow_theta", "slow_ax", "slow_ay")  # terms with a memory
 SCALE, DELAY = 0.1, 0.1  # unit of a channel's scale error, and s of its delay
-COEFFICIENT = {"x_force": "CX", "y_force": "CY", "z_force": "CZ", "rolling_moment": "Cl", "pitching_moment": "Cm",
-               "yawing_moment": "Cn"}  # fmt: skip
+COEFFICIENT = {component: coefficient for coefficient, component in COMPONENTS.items()}
 ABOUT = ("alpha", "elevator", "airspeed")  # quantities whose deviations from the records' medians are terms
 
 

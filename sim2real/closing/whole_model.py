@@ -20,9 +20,12 @@ from icing_env import effects
 from icing_env.effects.discrepancy import TERMS
 from icing_env.record import FloatArray
 from sim2real.baseline.references import Fit, directions
-from sim2real.closing.black_box import PUSHED, residual_accelerations
+from sim2real.closing import gap
+from sim2real.closing.black_box import FELT, PUSHED, residual_accelerations
 from sim2real.closing.remedy import Remedy, Values
+from sim2real.library.bends import COMPONENTS, changes
 from sim2real.library.candidates import Bank, Family, Nuisance
+from sim2real.library.terms import GENERIC
 from sim2real.posterior.generic import UnknownFit
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
 from sim2real.posterior.sets import SetFit
@@ -36,11 +39,7 @@ SHARE = 0.9  # probability, at least, that it is they that differ where they do 
 SHOWN, PLAIN = 3.0, 2.0  # standard errors, and times its published spread, from which a number is told (assumed)
 SEEN = 0.25  # tolerances by which a component is changed, from which its numbers are told (assumed)
 HALF = 0.5  # s in which an angular acceleration makes the rate that is compared with the tolerance
-NORMAL95 = 1.96
-PLACES = {"u": ("x_force", "ax"), "v": ("y_force", "ay"), "w": ("z_force", "az"), "p": ("rolling_moment", "p"),
-          "q": ("pitching_moment", "q"), "r": ("yawing_moment", "r")}  # fmt: skip
-COEFFICIENT = {"CX": "x_force", "CY": "y_force", "CZ": "z_force", "Cl": "rolling_moment", "Cm": "pitching_moment",
-               "Cn": "yawing_moment"}  # fmt: skip
+PLACES = {target: component for component, target, _ in GENERIC if component in COMPONENTS.values()}
 
 
 @dataclass(frozen=True)
@@ -92,17 +91,21 @@ class _Number:
     family: Family | None
 
 
-def incomplete(posterior: Posterior, precision: FloatArray) -> bool:
-    """Whether the best explanation leaves much, or takes numbers of the model along that are too far off.
+def incomplete(posterior: Posterior, flown: gap.Energy) -> bool:
+    """Whether the best explanation leaves much, or takes numbers of the published model along that are too far off.
 
     Args:
-        precision: of the nuisances, prior [n, n].
+        flown: the records in free flight, with that explanation; what only stretches the model leaves a gap there too.
     """
-    if posterior.tempering > ANOTHER:
-        return True
-    if posterior.settled is None:
-        return False
-    return float(posterior.settled @ precision @ posterior.settled) > chi2.isf(STRETCHED, len(precision))
+    if posterior.tempering > ANOTHER or posterior.settled is None:
+        return posterior.tempering > ANOTHER
+    stretched = float(posterior.settled @ posterior.settled) > chi2.isf(STRETCHED, len(posterior.settled))
+    return stretched and gap.g(flown.after, flown.alone) >= gap.null_quantile(flown.alone)
+
+
+def takes_most(before: gap.Energy, fitted: gap.Energy) -> bool:
+    """Whether the fitted numbers leave much less in free flight than what was found before."""
+    return gap.g(fitted.after, fitted.alone) < TAKEN * gap.g(before.after, before.alone)
 
 
 def fit_whole_model(flights: Sequence[Reconstruction], candidates: Bank, posterior: Posterior) -> WholeModel:
@@ -135,8 +138,8 @@ def fit_whole_model(flights: Sequence[Reconstruction], candidates: Bank, posteri
 
 def _numbers(flight: Reconstruction, candidates: Bank, posterior: Posterior) -> list[_Number]:
     """Every number of the aircraft, not of its instruments, by an effect of the library where one changes it alone."""
-    alone = {fields: (family, per) for family in candidates.families if family.effect.name in posterior.fits
-             for fields, per in [_changed(flight, family)]}  # fmt: skip
+    alone = {changes(f.effect): (f, per) for f in candidates.families if f.effect.name in posterior.fits
+             and (per := _per_unit(flight, f)) is not None}  # fmt: skip
     out = []
     for move in directions(candidates):
         if move.only or move.parameter.startswith("scale_"):
@@ -150,26 +153,24 @@ def _numbers(flight: Reconstruction, candidates: Bank, posterior: Posterior) -> 
     return out
 
 
-def _changed(flight: Reconstruction, family: Family) -> tuple[frozenset[str], float]:
-    """Fields of PARAMETERS that an effect changes by as much for each unit of its size, and how much."""
-    row, names = flight.parameters, flight.parameters.dtype.names or ()
-    rows = [effects.with_effects(row, {family.effect.name: {family.parameter.name: size}})
-            for size in (0.5 * family.nodes[0], family.nodes[0])]  # fmt: skip
-    half, whole = ({n: float(r[n][0] - row[n][0]) for n in names if r[n][0] != row[n][0]} for r in rows)
-    per = set(np.round([change / family.nodes[0] for change in whole.values()], 9))
-    straight = half.keys() == whole.keys() and np.allclose([2.0 * half[n] - whole[n] for n in whole], 0.0, atol=1e-9)
-    return (frozenset(whole), per.pop()) if straight and len(per) == 1 else (frozenset(), 1.0)
+def _per_unit(flight: Reconstruction, family: Family) -> float | None:
+    """By how much an effect changes its numbers for each unit of its size; None if not all alike and at any size."""
+    row = flight.parameters
+    per = {round(float(rows[name][0] - row[name][0]) / size, 9)
+           for size in (0.5 * family.nodes[0], family.nodes[0]) for name in changes(family.effect)
+           for rows in [effects.with_effects(row, {family.effect.name: {family.parameter.name: size}})]}  # fmt: skip
+    return per.pop() if len(per) == 1 else None
 
 
 def _set(numbers: Sequence[_Number], size: FloatArray, covariance: FloatArray) -> SetFit:
     """Effects with their sizes, as if they had been fitted together."""
-    error = NORMAL95 * np.sqrt(np.diag(covariance))
+    error = 1.96 * np.sqrt(np.diag(covariance))
     return SetFit(tuple(n.family for n in numbers if n.family is not None), 0.0, tuple(size.tolist()),
                   tuple((size - error).tolist()), tuple((size + error).tolist()), covariance)
 
 
 def _place(move: Nuisance) -> str:
-    return COEFFICIENT.get(move.parameter.partition("_")[0], "")
+    return COMPONENTS.get(move.parameter.partition("_")[0], "")
 
 
 def _places(flights: Sequence[Reconstruction], values: Values) -> dict[str, float]:
@@ -179,9 +180,8 @@ def _places(flights: Sequence[Reconstruction], values: Values) -> dict[str, floa
         changed = replace(flight, parameters=effects.with_effects(flight.parameters, values))
         apart = residual_accelerations(flight)[1] - residual_accelerations(changed)[1]
         squares, count = squares + np.sum(apart**2, axis=0), count + len(apart)
-    rms = dict(zip(PUSHED, np.sqrt(squares / count), strict=True))
-    return {place: float(rms[axis] * (1.0 if channel.startswith("a") else HALF) / TOLERANCE[channel])
-            for axis, (place, channel) in PLACES.items()}
+    unit = [TOLERANCE[FELT[axis]] if axis in FELT else TOLERANCE[axis] / HALF for axis in PUSHED]
+    return {PLACES[axis]: float(rms) for axis, rms in zip(PUSHED, np.sqrt(squares / count) / unit, strict=True)}
 
 
 def with_whole_model(posterior: Posterior, whole: WholeModel) -> Posterior:

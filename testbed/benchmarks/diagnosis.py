@@ -48,10 +48,9 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
     Raises:
         InputError: `out` holds another set, or its files are not those of its manifest.
     """
-    kind = "development" if seed is not None else "sealed"
     committed = _drawn(out, cases, seed, workers, progress)
     if ledger is not None:
-        enter_draw(ledger, kind, committed, out)
+        enter_draw(ledger, kind_of(committed), committed, out)
     names = sorted(committed["cases"])
     _solve(out, "answers", dict.fromkeys(names, ()), workers, progress)
     for rival in RIVALS if rivals else ():
@@ -64,7 +63,7 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
     progress("scoring")
     there = [out / f"answers_{rival}" for rival in RIVALS if any((out / f"answers_{rival}").glob("*.json"))]
     found = score(out / "answers", out / "keys", out / "refly", out / "answers_without", *there)
-    found |= {"set": kind, "sources": committed["sources"]}
+    found |= {"set": kind_of(committed), "sources": committed["sources"]}
     if ledger is not None:
         enter(ledger, found, out)
     return found
@@ -79,19 +78,28 @@ def _drawn(out: Path, cases: int, seed: int | None, workers: int, progress: Prog
         committed = read_json(out / "manifest.json")
         wanted = None if seed is None else DEVELOPMENT_SEED + seed
         if committed["count"] != cases or committed["development_seed"] != wanted:
-            kind = "sealed" if committed["development_seed"] is None else "development"
-            raise InputError(f"{out}: holds a {kind} set of {committed['count']} cases, not the one asked for; "
-                             "give another --out")
+            raise InputError(f"{out}: holds a {kind_of(committed)} set of {committed['count']} cases, "
+                             "not the one asked for; give another --out")
     else:
         try:
             committed = generate(out, cases, None if seed is None else DEVELOPMENT_SEED + seed, workers, progress)
         except ValueError as error:
             raise InputError(f"{error}; give another --out") from error
+    untouched(out, committed)
+    return committed | {"sources": source_hash("sim2real")}
+
+
+def untouched(out: Path, committed: Mapping[str, Any]) -> None:
+    """Raises an InputError unless the records and keys in `out` are those of its manifest."""
     wrong = tampered(out / "records", out / "keys", committed)
     if wrong:
         raise InputError(f"{out}: records or keys of {len(wrong)} cases are not those of the manifest, "
                          f"the first is {wrong[0]}")
-    return committed | {"sources": source_hash("sim2real")}
+
+
+def kind_of(committed: Mapping[str, Any]) -> str:
+    """What kind of set a manifest is of: its seed the operating system's, or one that is known."""
+    return "sealed" if committed["development_seed"] is None else "development"
 
 
 def removals(keys: Path) -> dict[str, str]:

@@ -11,7 +11,6 @@ from testbed.withheld.files import digest_of
 
 COLUMNS = ("date", "set", "cases", "sources", "manifest", "top1", "top3", "null_false_alarm", "pair_exact_set",
            "unknown_auroc_above_8", "where_f1", "ece", "coverage95", "closure_median")  # fmt: skip
-DRAWN = "drawn"
 
 
 def enter(path: Path, found: dict[str, Any], out: Path) -> None:
@@ -30,4 +29,4 @@ def enter_draw(path: Path, kind: str, committed: dict[str, Any], out: Path) -> N
     """Append that a set was drawn (hash of cases and salted keys, sources of the solver), unless that stands there."""
     if path.is_file() and digest_of(out / "manifest.json") in path.read_text(encoding="utf-8"):
         return
-    enter(path, {"set": f"{kind} {DRAWN}", "cases": committed["count"], "sources": committed["sources"]}, out)
+    enter(path, {"set": f"{kind} drawn", "cases": committed["count"], "sources": committed["sources"]}, out)

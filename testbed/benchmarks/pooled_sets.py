@@ -8,7 +8,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from icing_env.errors import InputError
-from testbed.withheld.files import read_json, tampered
+from testbed.benchmarks.diagnosis import kind_of, untouched
+from testbed.withheld.files import read_json
 from testbed.withheld.refly import FLOWN_AGAIN
 from testbed.withheld.score import score
 
@@ -44,10 +45,7 @@ def _whole(folder: Path) -> dict[str, Any]:
     if not (folder / "manifest.json").is_file():
         raise InputError(f"--pool {folder}: no manifest.json; give the --out of a run that ended")
     committed = read_json(folder / "manifest.json")
-    wrong = tampered(folder / "records", folder / "keys", committed)
-    if wrong:
-        raise InputError(f"--pool {folder}: records or keys of {len(wrong)} cases are not those of the manifest, "
-                         f"the first is {wrong[0]}")
+    untouched(folder, committed)
     wanted = {part: [name for name in committed["cases"] if part != "refly" or _flown_again(folder, name)]
               for part in ("answers", "refly")}  # fmt: skip
     lacking = [f"{part}/{name}.json" for part, names in wanted.items() for name in names
@@ -57,8 +55,7 @@ def _whole(folder: Path) -> dict[str, Any]:
                          "let its run end first")
     answers = (read_json(folder / "answers" / f"{name}.json") for name in committed["cases"])
     sources = sorted({a["provenance"]["sources"] for a in answers if "provenance" in a})
-    kind = "sealed" if committed["development_seed"] is None else "development"
-    return {"set": kind, "sources": " and ".join(sources)}
+    return {"set": kind_of(committed), "sources": " and ".join(sources)}
 
 
 def _flown_again(folder: Path, name: str) -> bool:
