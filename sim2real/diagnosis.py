@@ -18,6 +18,7 @@ from sim2real.answer import credible, describe, detection_limits, judge, problem
 from sim2real.baseline.references import Baseline, fit_baseline
 from sim2real.closing import gap
 from sim2real.closing.discrepancy import describe_unknown, described, in_other_form
+from sim2real.closing.own_numbers import with_own_numbers
 from sim2real.closing.remedy import Remedy, leading, remedy, resimulation, values_of
 from sim2real.closing.whole_model import (
     components_with,
@@ -127,30 +128,36 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     if explained is not None and (own := in_other_form(explained)) is not None:
         progress("describing the form of what was found")
         form = describe_unknown(flights, candidates, evidences, baseline, posterior.tempering, own)
-    change = remedy(explained, form or (unknown if explained and explained.unknown else None))
+    terms = form or (unknown if explained and explained.unknown else None)
+    alone = remedy(explained, terms)
     progress("flying the records freely, before and after")
     sigmas = [e.sigma_w for e in evidences]
-    training = _flown_freely(flights, sigmas, change, seed)
-    whole = None
-    if not (reference or simulator) and incomplete(posterior, training):
+    training = effects_alone = _flown_freely(flights, sigmas, alone, seed)
+    change, whole = with_own_numbers(alone, explained, terms, candidates.nuisances), None
+    if not (reference or simulator) and incomplete(posterior, effects_alone):
         progress("fitting all numbers of the model, since what was found is not all")
         fitted = fit_whole_model(flights, candidates, posterior)
         closer = _flown_freely(flights, sigmas, fitted.remedy(), seed)
-        if takes_most(training, closer):
-            whole, training = fitted, closer
-            posterior, change = with_whole_model(posterior, whole), whole.remedy()
+        if takes_most(effects_alone, closer):
+            training = closer
+            posterior, change, whole = with_whole_model(posterior, fitted), fitted.remedy(), fitted
             verdict, hypotheses = judge(posterior)
             explained, form = leading(verdict, posterior), None
+            alone = remedy(explained, None)
+            effects_alone = replace(closer, after=gap.of_all(flights, alone, change.paths))
+    if whole is None:
+        training = replace(effects_alone, after=gap.of_all(flights, change, change.paths))
     sizes = dict[str, History]()
     if explained is not None and explained.effects and whole is None:
         progress("looking at how the sizes went along the records")
-        sizes = histories(flights, candidates, evidences, baseline, posterior, explained.fit, change)
+        sizes = histories(flights, candidates, evidences, baseline, posterior, explained.fit, alone)
     progress("flying what these records could have revealed")
     shown = limits(evidences, candidates, baseline, posterior.tempering, posterior.fits)
     sigma = float(np.mean(sigmas))
     tested = _flown_freely(others, [sigma] * len(others), change, seed + 1000) if others else None
-    rungs = {"ladder": ladder(flights, others, candidates, baseline, evidences, posterior, explained, change, tested,
-                              seed, progress)} if climb and tested is not None else {}  # fmt: skip
+    less = gap.of_all(others, alone, change.paths) if others else None
+    rungs = {"ladder": ladder(flights, others, candidates, baseline, evidences, posterior, explained, alone, change,
+                              tested, seed, progress)} if climb and tested is not None else {}  # fmt: skip
     enters_at = {name: effect.enters_at for name, effect in effects.LIBRARY.items()}
     places = components(posterior, enters_at)
     if whole is not None:
@@ -169,8 +176,9 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         detection_limits=detection_limits(posterior.fits, shown),
         unknown=None if lacking is None else lacking.answer(),
         gap={"training": {"before": gap.g(training.before, training.alone),
-                          "after": gap.g(training.after, training.alone)},
-             "held_out": gap.held_out(tested, seed)} | rungs,
+                          "after": gap.g(training.after, training.alone),
+                          "after_effects_alone": gap.g(effects_alone.after, effects_alone.alone)},
+             "held_out": gap.held_out(tested, seed, less)} | rungs,
         next_manoeuvre=_next(flights[0], candidates, posterior, hypotheses, sigma),
         resimulate=resimulation(change, training, flights, evidences),
         data_problems=problems((*flights, *others)),

@@ -1,8 +1,9 @@
 """The evidence ladder: what is closed of the gap on held-out records by nothing, by rivals, and where there is none.
 
-On the same held-out windows: the model as it is; the best explanation that shares nothing with the diagnosed one; the
-diagnosed one; and a regression that knows no physics, as a ceiling. Then the same search on synthetic records of the
-model itself: the best explanation it finds there, believed or not, "closes" what it closes where there is nothing.
+On the same held-out windows: the model as it is, and with its own numbers refined as if there were no gap; the best
+explanation that shares nothing with the diagnosed one; the diagnosed effects alone, and with the model's own numbers as
+these settled beside them; a regression that knows no physics, as a ceiling. Then the same search on synthetic records
+of the model itself: the best explanation it finds there, believed or not, "closes" what it closes where nothing is.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from icing_env.record import FloatArray
 from sim2real.actuators.paths import driven
 from sim2real.baseline.references import Baseline
 from sim2real.closing import black_box, gap
 from sim2real.closing.discrepancy import describe_unknown
+from sim2real.closing.own_numbers import own_numbers, with_own_numbers
 from sim2real.closing.remedy import Remedy, remedy
 from sim2real.library.candidates import Bank, not_testable
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
@@ -33,13 +34,13 @@ Rung = dict[str, Any]
 
 
 def ladder(flights: Sequence[Reconstruction], others: Sequence[Reconstruction], candidates: Bank, baseline: Baseline,
-           evidences: Sequence[Evidence], posterior: Posterior, explained: Hypothesis | None, change: Remedy,
-           tested: gap.Energy, seed: int, progress: Progress = lambda text: None) -> dict[str, Any]:
+           evidences: Sequence[Evidence], posterior: Posterior, explained: Hypothesis | None, alone: Remedy,
+           change: Remedy, tested: gap.Energy, seed: int, progress: Progress = lambda text: None) -> dict[str, Any]:
     """Every rung on the held-out records.
 
     Args:
         flights, others: diagnosed and held-out records.
-        explained, change: the diagnosed explanation and what it changes in the model.
+        explained, alone, change: the diagnosed explanation, its effects, and what is changed in the model with them.
         tested: residual energies of the held-out records before and after `change`.
         seed: of synthetic records and intervals.
 
@@ -51,15 +52,19 @@ def ladder(flights: Sequence[Reconstruction], others: Sequence[Reconstruction], 
     progress("climbing the evidence ladder: the runner-up")
     rival = runner_up(posterior, explained)
     paths = change.paths
-    rungs = [_rung("nothing", [], replace(tested, after=tested.before), seed)]
     second = _remedy_of(rival, flights, candidates, evidences, baseline, posterior)
-    rungs.append(_rung("runner-up", _names(rival), replace(tested, after=_squares(others, second, paths)), seed))
-    rungs.append(_rung("diagnosed", _names(explained), tested, seed))
+    settled = next((h.settled for h in posterior.hypotheses if not h.effects and h.unknown is None), None)
+    numbers = Remedy() if settled is None else own_numbers(settled, candidates.nuisances)
+    names, diagnosed = _names(explained), tested.after
+    left = {"nothing": ([], tested.before), "numbers alone": ([], gap.of_all(others, numbers, paths)),
+            "runner-up": (_names(rival), gap.of_all(others, second, paths)),
+            "effects alone": (names, gap.of_all(others, alone, paths)), "diagnosed": (names, diagnosed)}  # fmt: skip
     progress("climbing the evidence ladder: a regression that knows no physics")
     box = black_box.train([driven(f, f.parameters, paths) for f in flights])
     pushed = [gap.squares(f, Remedy(), paths, partial(black_box.Pushed, box, driven(f, f.parameters, paths)))
               for f in others]
-    rungs.append(_rung("black box", [], replace(tested, after=np.concatenate(pushed)), seed))
+    left["black box"] = ([], np.concatenate(pushed))
+    rungs = [_rung(name, found, replace(tested, after=after), seed) for name, (found, after) in left.items()]
     progress("climbing the evidence ladder: the same search where there is no gap")
     return {"rungs": rungs, "noise95": gap.null_quantile(tested.alone),
             "no_gap": search_on_nothing(flights, others, candidates, baseline, evidences, seed)}
@@ -84,7 +89,7 @@ def search_on_nothing(flights: Sequence[Reconstruction], others: Sequence[Recons
     found, posterior = fit(made, candidates, untestable, baseline, lambda text: None)
     best = runner_up(posterior, None)
     change = _remedy_of(best, made, candidates, found, baseline, posterior)
-    before, after = (float(np.sqrt(np.nanmean(_squares(tests, what)))) for what in (Remedy(), change))
+    before, after = (float(np.sqrt(np.nanmean(gap.of_all(tests, what)))) for what in (Remedy(), change))
     return {"effects": _names(best), "probability_no_gap": posterior.none, "before": before, "after": after,
             "closure": 1.0 - after / before}
 
@@ -116,12 +121,7 @@ def _remedy_of(hypothesis: Hypothesis, flights: Sequence[Reconstruction], candid
                evidences: Sequence[Evidence], baseline: Baseline, posterior: Posterior) -> Remedy:
     unknown = None if hypothesis.unknown is None else describe_unknown(
         flights, candidates, evidences, baseline, posterior.tempering, hypothesis)
-    return remedy(hypothesis, unknown)
-
-
-def _squares(flights: Sequence[Reconstruction], change: Remedy, paths: gap.Paths = ()) -> FloatArray:
-    """Mean square residuals [windows, channels] of several records."""
-    return np.concatenate([gap.squares(flight, change, paths) for flight in flights])
+    return with_own_numbers(remedy(hypothesis, unknown), hypothesis, unknown, candidates.nuisances)
 
 
 def _names(hypothesis: Hypothesis | None) -> list[str]:

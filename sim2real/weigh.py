@@ -189,9 +189,9 @@ class _Weighing:
         self.known = gains_with(self._flying(), best, nuisances)
         return differ(self.known, self.evidences)
 
-    def refine(self) -> None:
-        """Fly the leading explanations where they lie."""
-        self.posterior = refine(self._flying(), self.start, self.posterior, self.places)
+    def refine(self, before: Hypothesis | None = None) -> None:
+        """Fly the leading explanations where they lie, and what was best `before`."""
+        self.posterior = refine(self._flying(), self.start, self.posterior, self.places, before)
 
     def refine_anew(self, progress: Progress) -> None:
         """The same with the gains and the tempering of what was best, unless that is lost with them."""
@@ -199,7 +199,7 @@ class _Weighing:
         if not self.judged_anew():
             return
         progress("flying the leading explanations again, gusts and remainder judged with them")
-        self.refine()
+        self.refine(best)
         again = [h.fit.misfit for h in self.posterior.hypotheses if h.unknown is None and h.effects == best.effects]
         if again and again[0] * self.posterior.tempering > LOSES * best.fit.misfit * before["posterior"].tempering:
             vars(self).update(before)

@@ -87,6 +87,9 @@ def _closing(found: Diagnosis) -> str:
         return (f"On the held-out records the gap is {held['before']:.2f} tolerances, "
                 "no more than noise and gusts alone may give, so there is nothing to close.")
     change = f"{100 * held['closure']:.0f} % closed" if held["closure"] > 0.0 else "it does not close"
+    if found.resimulate["model"]:
+        change += (f" ({100 * max(held['closure_effects_alone'], 0.0):.0f} % by the effects alone, "
+                   "the model's own numbers left as they were)")
     return (f"On the held-out records the gap goes from {held['before']:.2f} to {held['after']:.2f} tolerances: "
             f"{change}; the worst channel is {held['worst_channel']}.")
 

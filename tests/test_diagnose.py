@@ -90,7 +90,8 @@ def test_the_answer_has_its_form():
     assert sum(h["probability"] for h in result["hypotheses"]) == pytest.approx(1.0, abs=1e-9)
     assert set(result["where"]) == {"channels", "components", "regimes"}
     assert set(result["gap"]["held_out"]) == {"before", "after", "closure", "closure_low95", "closure_high95",
-                                              "worst_channel", "by_channel"}  # fmt: skip
+                                              "after_effects_alone", "closure_effects_alone", "worst_channel",
+                                              "by_channel"}  # fmt: skip
     tested = {e for h in result["hypotheses"] for e in h["effects"]}
     assert tested.isdisjoint({n["effect"] for n in result["not_testable"]})
     assert set(result["detection_limits"]) == tested

@@ -172,7 +172,9 @@ def test_an_unknown_closes_the_gap_as_knowing_it_does(unknown):
 
 
 def test_the_command_flies_the_aircraft_that_was_diagnosed(unknown):
-    name, values = parse(unknown.resimulate["command"].split("--effect ")[1])
+    own, terms = unknown.resimulate["command"].split(" --effect ")[1:]
+    assert parse(own)[1] == pytest.approx(unknown.details.change.values["derivatives"], rel=1e-5)
+    name, values = parse(terms)
     assert name == "discrepancy"
     assert values == pytest.approx(unknown.details.change.values["discrepancy"], rel=1e-5)
     assert len(unknown.resimulate["parameter_covariance"]) == len(unknown.unknown["terms"])
@@ -191,7 +193,8 @@ def test_the_form_of_a_known_effect_is_flown_with_it():
     assert form["component"] == "pitching_moment"
     for term, size in (("alpha*elevator", 8.0), ("alpha*alpha", 3.0)):
         assert abs(terms[term]["coefficient"] - size) < 3.0 * terms[term]["std_error"] < size
-    assert set(found.details.change.values) == {"pitch_trim", "discrepancy"}
+    assert list(found.details.change.values) == ["derivatives", "pitch_trim", "discrepancy"]
+    assert found.resimulate["model"]["Cm_alpha"]["change"] == 0.0  # among the terms there
     assert found.gap["held_out"]["closure"] > 0.7  # -0.2 without the terms
 
 

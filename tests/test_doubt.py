@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,7 +12,8 @@ from hypothesis import strategies as st
 from sim2real.flown.companions import CERTAIN
 from sim2real.library.candidates import bank
 from sim2real.over_time.varying import varying
-from sim2real.posterior.forgiveness import ELSEWHERE, _leaking, elsewhere
+from sim2real.posterior.forgiveness import ELSEWHERE, _in_larger, _leaking, elsewhere
+from sim2real.posterior.form import SHARES
 from sim2real.posterior.generic import UnknownFit
 from sim2real.posterior.hypotheses import DOUBT, MOST_DOUBT, Hypothesis, Posterior, doubt, doubted, normalised
 from sim2real.posterior.sets import SetFit
@@ -66,24 +69,41 @@ def one(*names: str) -> SetFit:
     return SetFit(tuple(next(f for f in bank().families if f.effect.name == name) for name in names))
 
 
-@given(st.floats(-5.0, 4000.0))
-def test_company_of_another_form_is_less_by_what_forms_leave_elsewhere(regained):
-    found = [Hypothesis(one("updraft"), None, -5.0, 100.0, regained=regained),
-             Hypothesis(one("updraft"), SOMETHING, -9.0, 140.0),
-             Hypothesis(one("updraft", "wing_ice"), None, -10.0, 140.0, regained=regained),
-             Hypothesis(one("fin_ice", "updraft", "wing_ice"), None, -16.0, 150.0),
+@given(st.floats(-5.0, 4000.0), st.floats(0.0, 1.0))
+def test_company_of_another_form_is_less_by_what_forms_leave_elsewhere(regained, ahead):
+    """Where it leads by no more than that; beside one that is far behind, and beside none, it is as it was."""
+    least = elsewhere(regained)
+    near = 105.0 + regained + ahead * least  # a log posterior that leads updraft's by a part of that
+    found = [Hypothesis(one("updraft"), None, -5.0, 110.0, regained=regained),
+             Hypothesis(one("updraft"), SOMETHING, -9.0, near + 9.0),
+             Hypothesis(one("updraft", "wing_ice"), None, -10.0, near + 10.0),
+             Hypothesis(one("fin_ice", "updraft"), None, -10.0, 1e4),
              Hypothesis(one("fin_ice", "wing_ice"), None, -10.0, 50.0),
              Hypothesis(one("wing_ice"), SOMETHING, -9.0, 50.0), Hypothesis(SetFit(), SOMETHING, -3.0, 80.0)]
     less = [before.log_posterior - after.log_posterior for before, after in zip(found, _leaking(found), strict=True)]
-    least = elsewhere(regained)
-    assert less == pytest.approx([0.0, least, least, least, 0.0, 0.0, 0.0])
+    assert less == pytest.approx([0.0, least, least, 0.0, 0.0, 0.0, 0.0], abs=1e-9)
 
 
-def test_what_a_form_leaves_elsewhere_grows_slowly():
+def test_company_is_less_by_less_the_farther_it_leads():
+    for lead, share in ((0.5, 1.0), (1.0, 1.0), (1.5, 0.5), (2.0, 0.0), (9.0, 0.0)):
+        found = [Hypothesis(one("updraft"), None, 0.0, 0.0, regained=400.0),
+                 Hypothesis(one("updraft", "wing_ice"), None, 0.0, 400.0 + lead * elsewhere(400.0))]
+        assert found[1].regained - _leaking(found)[1].regained == pytest.approx(share * elsewhere(400.0))
+
+
+def test_what_a_form_leaves_elsewhere_goes_with_its_amplitude():
     assert elsewhere(-3.0) == 0.0
-    assert elsewhere(4.0) == pytest.approx(4.0)
-    assert elsewhere(ELSEWHERE) == pytest.approx(ELSEWHERE)
-    assert elsewhere(1e3 * ELSEWHERE) == pytest.approx(4.0 * ELSEWHERE)
+    assert elsewhere(1.0) == ELSEWHERE
+    assert elsewhere(400.0) == pytest.approx(2.0 * elsewhere(100.0))
+
+
+def test_three_regain_no_more_than_two_and_what_the_third_gives_reason_for():
+    """The same terms about another point are a little better or worse; that is no reason to name a third effect."""
+    two, three = (replace(one(*names), misfit=left) for names, left in ((("updraft", "wing_ice"), 500.0),
+                                                                       (("fin_ice", "updraft", "wing_ice"), 400.0)))
+    found = [Hypothesis(two, None, -10.0, 140.0, regained=30.0), Hypothesis(three, None, -16.0, 150.0, regained=90.0)]
+    assert [h.regained for h in _in_larger(found)] == [30.0, pytest.approx(30.0 + 0.5 * SHARES[-1] ** 2 * 100.0)]
+    assert [h.regained for h in _in_larger(found[1:])] == [90.0]  # where no two were tried
 
 
 def test_no_size_is_sought_that_varies_where_there_may_be_no_gap():

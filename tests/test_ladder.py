@@ -32,7 +32,7 @@ def climbed() -> Diagnosis:
 
 def test_the_diagnosed_effect_stands_above_its_rival_and_beside_the_ceiling(climbed):
     rungs = {r["name"]: r for r in climbed.gap["ladder"]["rungs"]}
-    assert list(rungs) == ["nothing", "runner-up", "diagnosed", "black box"]
+    assert list(rungs) == ["nothing", "numbers alone", "runner-up", "effects alone", "diagnosed", "black box"]
     assert rungs["nothing"]["closure"] == 0.0
     assert rungs["nothing"]["gap"] == climbed.gap["held_out"]["before"]
     assert rungs["diagnosed"]["closure"] == climbed.gap["held_out"]["closure"] > rungs["runner-up"]["closure"] + 0.3

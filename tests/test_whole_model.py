@@ -14,7 +14,7 @@ from icing_env.record import FlightRecord
 from sim2real.closing import gap, whole_model
 from sim2real.diagnosis import diagnose
 from sim2real.library.candidates import bank
-from sim2real.posterior.hypotheses import Hypothesis, Posterior, normalised
+from sim2real.posterior.hypotheses import Hypothesis, Posterior, Settled, normalised
 from sim2real.posterior.sets import SetFit
 from sim2real.records.reconstruct import reconstruct
 from sim2real.words import sentences
@@ -91,7 +91,9 @@ def test_what_stretches_the_model_is_not_all():
     much, none = (gap.Energy(noise[0], noise[0] + more, noise, np.zeros((6, 1))) for more in (5.0, 0.0))
 
     def told(tempering: float, settled: np.ndarray | None, left: gap.Energy = much) -> bool:
-        found = Posterior((), {}, (), {}, np.zeros((1, 1)), tempering=tempering, settled=settled)
+        where = None if settled is None else Settled(settled, np.ones_like(settled))
+        best = Hypothesis(SetFit(), None, 0.0, 0.0, settled=where)
+        found = Posterior((best,), {}, (), {}, np.zeros((1, 1)), tempering=tempering)
         return whole_model.incomplete(found, left)
 
     assert told(3.0, None) and not told(1.0, None)

@@ -22,10 +22,11 @@ def key(request) -> dict:
 
 
 def answer(name: str, **values: float) -> dict:
-    told = {p: {"estimate": v, "low95": v, "high95": v, "unit": "1"} for p, v in values.items()}
-    return {"verdict": "explained", "hypotheses": [{"effects": [], "unknown": False, "probability": 0.6},
-                                                   {"effects": [name], "unknown": False, "probability": 0.4}],
-            "effects": [{"name": name, "parameters": told}]}  # fmt: skip
+    return commanded(f"--effect {name}:" + ",".join(f"{p}={v}" for p, v in values.items()))
+
+
+def commanded(effects: str) -> dict:
+    return {"verdict": "explained", "resimulate": {"command": f"icing fly clear_air {effects}"}}
 
 
 def test_the_truth_closes_the_gap_and_another_effect_does_not(key):
@@ -41,9 +42,7 @@ def test_the_truth_closes_the_gap_and_another_effect_does_not(key):
 
 
 def test_an_answer_without_effects_leaves_the_gap_as_it_was(key):
-    both = [{"effects": ["tail_ice"], "unknown": True, "probability": 1.0}]
-    for silent in ({"verdict": "no_gap", "hypotheses": [], "effects": []}, {"error": "refused"},
-                   {"verdict": "unknown", "hypotheses": both, "effects": []}):
+    for silent in (commanded(""), {"error": "refused"}):
         found = refly.flown_again(silent, key)
         assert found["after"] == pytest.approx(key["held_out"]["before"])
         assert found["own_after"] == pytest.approx(key["held_out"]["own_before"])
@@ -54,11 +53,40 @@ def test_every_parameter_of_the_library_can_be_flown():
     from icing_env.effects import LIBRARY
 
     for name, effect in LIBRARY.items():
-        parts, lacking = refly.told(answer(name, **{p.name: p.typical for p in effect.parameters}))
-        assert not lacking or name == "turbulence", name
-        for part, _, size in parts:
+        model = refly.told(answer(name, **{p.name: p.typical for p in effect.parameters}))
+        assert not model.lacking or name == "turbulence", name
+        for part, _, size in model.parts:
             assert BY_NAME[part].same(size) is not None
-    assert refly.told(answer("made_up", size=1.0)) == ((), ["made_up.size"])
+    assert refly.told(answer("made_up", size=1.0)) == refly.Told((), {}, {}, ("made_up.size",))
+
+
+def test_derivatives_and_lines_are_flown_too(key):
+    """With the truth's effect in its true form the true aircraft is left, and that leaves noise."""
+    (name,), (form,) = key["effects"], key["forms"]
+    (parameter, size), = key["parameters"][name].items()
+    whole = commanded(f"--effect derivatives:Cl_p=0.05,Cm_alpha=-0.05 --effect {name}:{parameter}={size}")
+    assert refly.told(whole).factors == pytest.approx({"Cl_p": 1.05, "Cm_alpha": 0.95})
+    if form == "same":
+        found = refly.flown_again(whole, key)
+        assert found["after"] == pytest.approx(key["held_out"]["own_oracle"])
+        assert found["effects_after"] == pytest.approx(key["held_out"]["oracle"])
+
+
+def test_terms_about_a_condition_are_those_of_the_library():
+    """What the generator adds to its numbers is what `discrepancy` adds to the simulator's, but for what it lacks."""
+    from icing_env.aircraft import load
+    from icing_env.effects import with_effects
+
+    values = {"CX_alpha_alpha": 0.4, "CZ_alpha": 0.3, "CZ_0": 0.01, "Cm_elevator": -0.1, "CY_r": 0.2, "Cl_0": 1e-3,
+              "at_alpha": 0.05, "at_elevator": -0.02, "bias_alpha": 0.01, "scale_alpha": 0.1}  # fmt: skip
+    terms, lacking = refly.linear(values)
+    before, after = load(), with_effects(load(), {"discrepancy": values})
+    changed = {n for n in before.dtype.names if before[n][0] != after[n][0]}
+    assert not lacking and changed == set(terms)
+    for name, value in terms.items():
+        assert after[name][0] - before[name][0] == pytest.approx(value)
+    assert refly.linear({"Cm_alpha_elevator": 1.0, "CZ_time": 0.1, "drift_q": 0.1, "Cn_p": 0.0})[1] == [
+        "discrepancy.Cm_alpha_elevator", "discrepancy.CZ_time", "discrepancy.drift_q"]
 
 
 def test_noise_alone_is_no_gap_and_the_start_is_fitted():

@@ -114,11 +114,14 @@ def test_closure_is_that_of_the_answer_flown_again_and_counts_where_there_is_a_g
     pairs = [(answer(["effect_1"]), key("single", ["effect_1"], 0.0, held_out=h)) for h in (held, held, small)]
     folders = write(tmp_path, pairs)
     (tmp_path / "refly").mkdir()
-    for name, after, own in (("c000", 0.2, 0.0), ("c001", 0.6, 0.4), ("c002", 0.0, 0.0)):
-        (tmp_path / "refly" / f"{name}.json").write_text(json.dumps({"after": after, "own_after": own}))
+    for name, after, alone, own in (("c000", 0.2, 0.4, 0.0), ("c001", 0.6, 0.8, 0.4), ("c002", 0.0, 0.0, 0.0)):
+        left = {"after": after, "effects_after": alone, "own_after": own}
+        (tmp_path / "refly" / f"{name}.json").write_text(json.dumps(left))
     found = score.score(*folders, tmp_path / "refly")
     assert found["closure_median"] == pytest.approx(0.6)  # of 0.8 and 0.4; the third has no gap to close
-    assert found["oracle_fraction"] == pytest.approx(0.75)
+    assert found["oracle_fraction"] == pytest.approx(0.6)  # the true aircraft, its own derivatives too, closes all
+    assert found["closure_effects_median"] == pytest.approx(0.4)  # of 0.6 and 0.2
+    assert found["oracle_fraction_effects"] == pytest.approx(0.5)
     assert found["closure_own_median"] == pytest.approx(0.75) and found["oracle_fraction_own"] == pytest.approx(0.75)
     assert found["closure_told_median"] == 0.9
 

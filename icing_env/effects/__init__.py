@@ -25,6 +25,7 @@ from icing_env.effects import (
     beta_bias,
     boom_oscillation,
     cg_shift,
+    derivatives,
     dihedral_effect,
     directional_stability,
     discrepancy,
@@ -127,7 +128,7 @@ LIBRARY: dict[str, Effect] = {
 }
 
 # Ways of flying a description, which are no explanation and are never searched for.
-DESCRIPTIONS: dict[str, Effect] = {discrepancy.EFFECT.name: discrepancy.EFFECT}
+DESCRIPTIONS: dict[str, Effect] = {e.name: e for e in (derivatives.EFFECT, discrepancy.EFFECT)}
 
 
 def get(name: str) -> Effect:

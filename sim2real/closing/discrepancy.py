@@ -59,12 +59,14 @@ class Description:
         terms: (name, size, standard error) of those that earned their place, the surest first.
         values: of the effect `discrepancy`.
         covariance: of the sizes of `terms`.
+        nuisances: where the model's own numbers settled beside them [n], none at the component; None if not flown.
     """
 
     component: str
     terms: tuple[tuple[str, float, float], ...]
     values: dict[str, float]
     covariance: FloatArray
+    nuisances: FloatArray | None = None
 
     @property
     def kind(self) -> str:
@@ -175,7 +177,9 @@ def describe_unknown(flights: Sequence[Reconstruction], candidates: Bank, eviden
         turn = nearer(centre + nuisance_mean(gram, only, weights), only)
         if gained < SETTLED:
             break
-    return _written(component, terms, at, x + step, chosen, covariance)
+    beside = np.zeros(len(candidates.nuisances))
+    beside[kept] = turn
+    return replace(_written(component, terms, at, x + step, chosen, covariance), nuisances=beside)
 
 
 def _told(component: str, terms: Sequence[tuple[str, float, float]], reach: Mapping[str, float]) -> Description:

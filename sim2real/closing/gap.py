@@ -7,7 +7,7 @@ records through the same windows); g = sqrt(mean over channels of max(e_c^2 - f_
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,6 +69,11 @@ def squares(flight: Reconstruction, change: Change, paths: Paths = (),
     return _mean_square(residuals(driven(flight, changed, paths), changed, cut(flight), push)[0])
 
 
+def of_all(flights: Sequence[Reconstruction], change: Change, paths: Paths = ()) -> FloatArray:
+    """`squares` [windows, channels] of several records, one after the other."""
+    return np.concatenate([squares(flight, change, paths) for flight in flights])
+
+
 def together(parts: list[Energy]) -> Energy:
     """Windows of several records as one set."""
     return Energy(np.concatenate([p.before for p in parts]), np.concatenate([p.after for p in parts]),
@@ -111,19 +116,30 @@ def null_quantile(alone: FloatArray, q: float = 0.95) -> float:
     return float(np.quantile(found, q))
 
 
-def held_out(energy: Energy | None, seed: int) -> dict[str, object]:
-    """The figures of `gap.held_out`; null where there is no held-out record or no gap to close."""
-    keys = ("before", "after", "closure", "closure_low95", "closure_high95", "worst_channel", "by_channel")
+def held_out(energy: Energy | None, seed: int, effects_alone: FloatArray | None = None) -> dict[str, object]:
+    """The figures of `gap.held_out`; null where there is no held-out record or no gap to close.
+
+    Args:
+        energy: with all that the diagnosis changes.
+        seed: of the interval.
+        effects_alone: what its effects alone leave [windows, channels], the model's own numbers as they were.
+    """
+    keys = ("before", "after", "closure", "closure_low95", "closure_high95", "after_effects_alone",
+            "closure_effects_alone", "worst_channel", "by_channel")  # fmt: skip
     out: dict[str, object] = dict.fromkeys(keys)
     if energy is None:
         return out
     out["before"], out["after"] = g(energy.before, energy.alone), g(energy.after, energy.alone)
     before, after = by_channel(energy.before), by_channel(energy.after)
     out["by_channel"] = {c: {"before": before[c], "after": after[c]} for c in before}
+    if effects_alone is not None:
+        out["after_effects_alone"] = g(effects_alone, energy.alone)
     out["worst_channel"] = max(after, key=lambda c: after[c])
     if g(energy.before, energy.alone) > null_quantile(energy.alone):
         out["closure"] = 1.0 - float(out["after"]) / float(out["before"])  # type: ignore[arg-type]
         out["closure_low95"], out["closure_high95"] = _interval(energy, seed)
+        if effects_alone is not None:
+            out["closure_effects_alone"] = 1.0 - float(out["after_effects_alone"]) / float(out["before"])  # type: ignore[arg-type]
     return out
 
 

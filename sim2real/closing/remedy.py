@@ -31,10 +31,12 @@ class Remedy:
     Attributes:
         values: as `icing_env.effects.with_effects` takes them.
         covariance: of the fitted numbers, those of the set first, then the unknown's terms; None where none is known.
+        own: the model's own numbers that are flown with them: relative change and its standard error, by name.
     """
 
     values: Values = field(default_factory=dict)
     covariance: FloatArray | None = None
+    own: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def __call__(self, parameters: NDArray) -> NDArray:
         """PARAMETERS with the values in them."""
@@ -98,4 +100,5 @@ def resimulation(change: Remedy, training: gap.Energy, flights: Sequence[Reconst
                 "wind": {"sigma_w": evidence.sigma_w}, "biases": {}}
                for start, evidence in zip(starts, evidences, strict=True)]
     return {"command": change.command, "records": records,
-            "parameter_covariance": None if change.covariance is None else np.asarray(change.covariance).tolist()}
+            "parameter_covariance": None if change.covariance is None else np.asarray(change.covariance).tolist(),
+            "model": {name: {"change": size, "std_error": error} for name, (size, error) in change.own.items()}}

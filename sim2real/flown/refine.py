@@ -32,6 +32,7 @@ from sim2real.posterior.hypotheses import (
     P_UNKNOWN,
     Hypothesis,
     Posterior,
+    Settled,
     is_home,
     normalised,
     set_prior,
@@ -46,16 +47,19 @@ PART = 0.1  # of what a set is more probable than nothing (in logarithms), that 
 TAKEN = 4.0  # whitened square above luck, that generic terms take of what leaves room for a companion (assumed)
 
 
-def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior: Posterior,
-           places: Places) -> Posterior:  # fmt: skip
+def refine(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior: Posterior, places: Places,
+           before: Hypothesis | None = None) -> Posterior:  # fmt: skip
     """The posterior with its leading explanations fitted where they lie, until the best of them has been flown.
 
     Args:
         start: nuisances [n] that a hypothesis is settled from.
         places: where sets settled before: they are settled from there; added to.
+        before: what was best when these were flown last: it is flown again, whatever the linear fit says of it now.
     """
     search = _Search(flying, start, posterior, places)
     search.fly([search.nothing_at_all(), *(search.found.index(h) for h in leading(posterior))])
+    if before is not None and before.effects:
+        search.fly([search.propose(before.fit)])
     search.fly(search.companions())
     while (following := search.following()) is not None:
         search.fly([following])
@@ -111,7 +115,7 @@ class _Search:
     def _less(self, i: int) -> list[int]:
         """Indices of a flown set without each of its members, from where it settled if they were not flown yet."""
         fit = self.found[i].fit
-        found = [self._propose(without(fit, m)) for m in range(len(fit.families)) if len(fit.families) > 1]
+        found = [self.propose(without(fit, m)) for m in range(len(fit.families)) if len(fit.families) > 1]
         self.beginning = dict.fromkeys(found, self.points[i].nuisances) | self.beginning
         return found
 
@@ -181,10 +185,10 @@ class _Search:
         first, left = self.found[i], float(self.left[i].reduced()[0, 0])
         if not any(left - u.left > TAKEN for u in self.generic[i]) and not len(self.points[i].held):
             return []
-        return [self._propose(together(first.fit, fit))
+        return [self.propose(together(first.fit, fit))
                 for fit in companions(self.flying, self.linear, first.fit, self.points[i])]
 
-    def _propose(self, fit: SetFit) -> int:
+    def propose(self, fit: SetFit) -> int:
         """Index of a set, with sizes as proposed if it was not flown yet."""
         names = tuple(sorted(fit.effects))
         known = {h.effects: i for i, h in enumerate(self.found) if h.unknown is None}
@@ -233,7 +237,12 @@ class _Search:
         more = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
         prior = np.log(P_BESIDE / (1.0 - P_NONE)) + known.log_prior if known.effects else np.log(P_UNKNOWN)
         return [Hypothesis(known.fit, best, float(prior), known.log_evidence + gained + more,
-                           Form((0.0,), (best.left,), self._at_liberty(known.fit).free(remainder, best)))]
+                           Form((0.0,), (best.left,), self._at_liberty(known.fit).free(remainder, best)),
+                           settled=self._where(i))]
+
+    def _where(self, i: int) -> Settled:
+        """Nuisances where a flown set settled, in its other form if it was flown in one."""
+        return (self.bent[i].point if i in self.bent else self.points[i]).settled
 
     def _named(self, unknown: UnknownFit, beside: Hypothesis) -> bool:
         """Whether generic terms are another form of a single effect of the library; beside others, the like of it."""
@@ -254,7 +263,7 @@ class _Search:
         ranked, others = self._ranked(), list[Hypothesis]()
         found = list(self.found)
         for i in ranked:
-            found[i] = replace(found[i], form=with_terms(found[i].form, self._own(i)[0]))
+            found[i] = replace(found[i], form=with_terms(found[i].form, self._own(i)[0]), settled=self._where(i))
         for i in dict.fromkeys([self.nothing_at_all(), ranked[0], *self._ranked(1)[:1]]):
             others += self._beside(i) if i in self.left else []
         bound = found[ranked[0]].log_posterior
@@ -265,5 +274,4 @@ class _Search:
         told = forgive(kept, self.nothing, least, bare, flown)
         bound = max(told[k].log_posterior for k in flown)
         told = [h for k, h in enumerate(told) if k in flown or h.unknown is not None or h.log_posterior <= bound]
-        settled = self.bent[ranked[0]].point if ranked[0] in self.bent else self.points[ranked[0]]
-        return replace(self.linear, hypotheses=normalised(told, 0.0), bare=bare, settled=settled.nuisances)
+        return replace(self.linear, hypotheses=normalised(told, 0.0), bare=bare)

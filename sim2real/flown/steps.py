@@ -12,6 +12,7 @@ from scipy.optimize import lsq_linear
 
 from icing_env.record import FloatArray
 from sim2real.library.candidates import NUISANCE_STEP
+from sim2real.posterior.hypotheses import Settled
 from sim2real.posterior.sets import SetFit
 
 ROUNDS, PATIENCE = 10, 2  # steps with the same slopes by nuisances, and those of them that need not help
@@ -76,6 +77,13 @@ class Point:
     def held(self) -> NDArray[np.intp]:
         """Nuisances that have gone as far as they may."""
         return np.flatnonzero(np.abs(self.nuisances) > FARTHEST - 1e-9)
+
+    @property
+    def settled(self) -> Settled:
+        """Nuisances and their standard errors, those of the sizes in them."""
+        unit = 1.0 / np.sqrt(np.diag(self.information))
+        error = unit * np.sqrt(np.diag(np.linalg.inv(self.information * unit[:, None] * unit)))
+        return Settled(self.nuisances, np.asarray(error[len(self.sizes) :], np.float64))
 
     def without_held(self) -> Point:
         """The same with these as constants."""

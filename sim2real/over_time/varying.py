@@ -26,7 +26,7 @@ from sim2real.library.candidates import Bank, Family, shifted, unbroken
 from sim2real.over_time.by_stretch import Way, cut_up, gaussian, products, responses, ways, without
 from sim2real.over_time.history import SPREADS
 from sim2real.posterior.form import forgiven
-from sim2real.posterior.hypotheses import Hypothesis, Posterior, normalised
+from sim2real.posterior.hypotheses import Hypothesis, Posterior, Settled, normalised
 from sim2real.posterior.sets import SetFit
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.records.side_by_side import each
@@ -81,19 +81,18 @@ def varying(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
                 *(fit.left for _, fit in found))  # fmt: skip
     single = max((h.log_prior for h in posterior.hypotheses if len(h.effects) == 1), default=-np.inf)
     told = {h.effects: h for h in posterior.hypotheses if h.unknown is None}
-    settled = dict[tuple[str, ...], FloatArray]()
     worth = list[float]()
     for family, fit in found:
         own = told.get((family.effect.name,))
         log = fit.log + 0.5 * nothing
         varied = Hypothesis(_set_fit(candidates, family, fit, log), None, single + float(np.log(VARIES)), log,
-                            regained=forgiven(fit.left - least, nothing - fit.left))  # fmt: skip
+                            regained=forgiven(fit.left - least, nothing - fit.left),
+                            settled=Settled(fit.nuisances, np.ones_like(fit.nuisances)))  # fmt: skip
         worth.append(varied.log_evidence + varied.regained)
         if own is None or varied.log_posterior > own.log_posterior:
-            told[varied.effects], settled[varied.effects] = varied, fit.nuisances
+            told[varied.effects] = varied
     others = [_or_any(h, worth) if h is best else h for h in posterior.hypotheses if h.unknown is not None]
-    out = normalised([*told.values(), *others], 0.0)
-    return replace(posterior, hypotheses=out, settled=settled.get(out[0].effects, posterior.settled))
+    return replace(posterior, hypotheses=normalised([*told.values(), *others], 0.0))
 
 
 def _or_any(unknown: Hypothesis, worth: Sequence[float]) -> Hypothesis:

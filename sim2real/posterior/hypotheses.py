@@ -28,11 +28,20 @@ KEPT = 1e-5  # sets of several effects less probable than this are dropped
 
 
 @dataclass(frozen=True, eq=False)
+class Settled:
+    """Where an explanation settled in flight: nuisances [n] and their standard errors [n], in prior deviations."""
+
+    nuisances: FloatArray
+    error: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class Hypothesis:
     """One explanation: a set of effects (empty: none) and perhaps something unknown beside it.
 
     `form`: of its effects, where that may be another than the library's; `instead`: generic terms at home that say it
-    better than the library's; `regained`: log evidence gained by these, and by what is forgiven (see `posterior.form`).
+    better than the library's; `regained`: log evidence gained by these, and by what is forgiven (see `posterior.form`);
+    `settled`: where it was flown.
     """
 
     fit: SetFit
@@ -43,6 +52,7 @@ class Hypothesis:
     instead: UnknownFit | None = None
     regained: float = 0.0
     probability: float = 0.0
+    settled: Settled | None = None
 
     @cached_property
     def effects(self) -> tuple[str, ...]:
@@ -86,7 +96,6 @@ class Posterior:
         raw: inner products of all rows, nuisances where they are.
         bare: whitened square that is left where the best flown set may do whatever it likes at home.
         courses: free courses of time, by component.
-        settled: nuisances [n] where the best flown set settled, if any was flown.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -97,7 +106,6 @@ class Posterior:
     tempering: float = 1.0
     raw: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     bare: float = np.inf
-    settled: FloatArray | None = None
     courses: tuple[UnknownFit, ...] = ()
 
     @property
@@ -123,6 +131,11 @@ class Posterior:
     def best(self) -> Hypothesis:
         """The most probable explanation."""
         return self.hypotheses[0]
+
+    @property
+    def settled(self) -> FloatArray | None:
+        """Nuisances [n] where the most probable of what was flown settled, if any was."""
+        return next((h.settled.nuisances for h in self.hypotheses if h.settled is not None), None)
 
     def leading(self, name: str) -> SetFit:
         """The most probable set that holds an effect."""

@@ -106,7 +106,8 @@ def split(fit: SetFit, form: Form | None, fits: Sequence[UnknownFit], nothing: f
     Args:
         nothing, raw, explained: of `is_own`.
     """
-    as_well = -np.inf if form is None else float(np.logaddexp.reduce(form.gained))
+    # a share is one of several, of which the terms will be one too
+    as_well = -np.inf if form is None else float(np.logaddexp.reduce(form.gained) + np.log(len(SHARES)))
     own = [u for u in fits if is_own(fit, u, nothing, raw, explained)
            or (at_home(u.component, fit.effects) and WORTH < u.log_evidence <= as_well)]  # fmt: skip
     return max(own, key=lambda u: u.log_evidence, default=None), [u for u in fits if u not in own]

@@ -9,6 +9,7 @@ import numpy as np
 from icing_env.record import FloatArray
 from sim2real.signatures.evidence import Evidence
 
+LUCK = 2.0  # standard deviations by which noise alone exceeds what it leaves on average (95 in 100 nulls: 1 to 2.3)
 FIRST_ORDER = 3.0  # least tempering where another simulator's accelerations stand in for its flight (assumed)
 
 
@@ -19,23 +20,29 @@ def total(evidences: Sequence[Evidence]) -> FloatArray:
 
 def noise(evidences: Sequence[Evidence], tempering: float) -> float:
     """Tempered whitened square that noise alone would leave, if it is known to be less than what is left."""
-    return sum(e.samples for e in evidences) / tempering if tempering > 1.0 else np.inf
+    return _lucky(evidences) / tempering if tempering > 1.0 else np.inf
+
+
+def _lucky(evidences: Sequence[Evidence]) -> float:
+    """Whitened square that noise alone stays below: a chi-square of as many degrees of freedom as samples."""
+    samples = sum(e.samples for e in evidences)
+    return samples + LUCK * float(np.sqrt(2.0 * samples))
 
 
 def temper(misfit: float, evidences: Sequence[Evidence]) -> float:
     """What to divide the evidence by because even the best explanation leaves more than noise, and that coloured.
 
     With the mean whitened square c of what is left over and the time tau that it stays correlated (in samples):
-    1 + (c - 1) tau, and 1 where c is below one. Model error that nobody can name is thus counted as noise, instead of
-    as thousands of independent proofs of whatever lies nearest. tau is that of the model's own innovations; an
-    explanation that takes most of what they have above noise takes as much of their colour.
+    1 + (c - 1) tau, and 1 where c is below one, what may be luck left out. Model error that nobody can name is thus
+    counted as noise, instead of as thousands of independent proofs of whatever lies nearest. tau is that of the model's
+    own innovations; an explanation that takes most of what they have above noise takes as much of their colour.
 
     Args:
         misfit: whitened square that the best explanation leaves, nuisances at their best.
         evidences: of the records.
     """
     samples = sum(e.samples for e in evidences)
-    excess = max(misfit / samples - 1.0, 0.0)
+    excess = max((misfit - _lucky(evidences)) / samples, 0.0)
     whole = max(float(np.sum([np.sum(e.whitened**2) for e in evidences])) / samples - 1.0, excess, 1e-9)
     coloured = float(np.mean([correlation_time(e.whitened) for e in evidences])) - 1.0
     least = FIRST_ORDER if any(e.flight.known is not None for e in evidences) else 1.0

@@ -10,17 +10,21 @@ from numpy.typing import NDArray
 
 from testbed.withheld import effects, gusts, instruments, manoeuvres, trim, unknown
 from testbed.withheld import plant as pl
-from testbed.withheld.numbers import DTYPE, KNOBS, PUBLISHED, airframe
+from testbed.withheld.numbers import DTYPE, KNOBS, PUBLISHED, SENSOR_KNOBS, airframe
 
 CATALOGUE = {**effects.BY_NAME, **unknown.BY_NAME}
 
 
 @dataclass(frozen=True)
 class Aircraft:
-    """What is flown: `baseline` factors by number (spread of derivatives, mass) and `parts` (effect, form, size)."""
+    """What is flown: `baseline` factors by number (spread of derivatives, mass) and `parts` (effect, form, size).
+
+    `terms`: what is added to numbers of the airframe and of the instruments beside, by name.
+    """
 
     baseline: Mapping[str, float] = field(default_factory=dict)
     parts: Sequence[tuple[str, str, float]] = ()
+    terms: Mapping[str, float] = field(default_factory=dict)
 
     def row(self) -> NDArray:
         """Numbers of this aircraft: published, changed by the effects, then by the baseline's factors."""
@@ -37,6 +41,9 @@ class Aircraft:
             row[key] *= factor
             if f"{key}_soft" in (DTYPE.names or ()):
                 row[f"{key}_soft"] *= factor
+        for key, value in self.terms.items():
+            if key not in SENSOR_KNOBS:
+                row[key] += value
         return row
 
     def instruments(self) -> dict[str, float]:
@@ -45,6 +52,8 @@ class Aircraft:
         for name, form, size in self.parts:
             for key, value in getattr(CATALOGUE[name], form)(size)[1].items():
                 wrong[key] = wrong.get(key, 0.0) + value
+        for key in set(self.terms) & set(SENSOR_KNOBS):
+            wrong[key] = wrong.get(key, 0.0) + self.terms[key]
         return wrong
 
 

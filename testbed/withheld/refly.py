@@ -1,16 +1,18 @@
 """Fly held-out records again with what the answers say: closure that no solver computes for itself.
 
-`python -m testbed.withheld.refly ANSWERS KEYS OUT`, once the keys are open. The published aircraft with the effects
-of the first hypothesis at their estimates, in the library's form and on the generator's plant, flies the windows of
-`windows.py`; one file per single effect or pair goes to OUT, where the scorer reads it. What is there is kept.
+`python -m testbed.withheld.refly ANSWERS KEYS OUT`, once the keys are open. The published aircraft with what an answer
+changes by its command (effects in the library's form, derivatives, terms beside), on the generator's plant, flies the
+windows of `windows.py`; one file per single effect or pair goes to OUT, where the scorer reads it. What is there stays.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import re
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
 from itertools import repeat
 from multiprocessing import get_context
 from pathlib import Path
@@ -24,10 +26,12 @@ from testbed.withheld.effects import BY_NAME
 from testbed.withheld.files import read_json, write_text
 from testbed.withheld.flights import Aircraft, recorded
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
+from testbed.withheld.numbers import DERIVATIVES, SENSOR_KNOBS
 from testbed.withheld.windows import gap_of, held
 from testbed.workers import a_core_each
 
 FLOWN_AGAIN = ("single", "pair")  # tiers with an effect that the library holds
+LINES = {*DERIVATIVES, *SENSOR_KNOBS, "CY_0", "Cl_0", "Cn_0", "Cl_alpha"}  # numbers that the plant has, to add to
 Parts = tuple[tuple[str, str, float], ...]
 
 
@@ -66,18 +70,20 @@ def flown_again(answer: dict[str, Any], key: dict[str, Any]) -> dict[str, Any]:
     """Gaps of an answer's model on the held-out records of its case.
 
     Returns:
-        `after` from the published aircraft, `own_after` from this aircraft's own derivatives and mass; `flown`: what
-        was added, `not_flown`: what the generator has no form of.
+        `after` of all that the answer changes, `effects_after` of its effects alone, both from the published aircraft;
+        `own_after` of these from the aircraft's own derivatives and mass; `flown`: the effects, `not_flown`: what the
+        generator has no number for.
     """
-    parts, lacking = told(answer)
+    model = told(answer)
     design = Design(key["tier"], true_parts(key), **key["design"])
     aircraft = Aircraft(design.baseline, design.parts)
     flights = [held(*recorded(aircraft, m, design.gain, design.air, design.random(i)))
                for i, m in enumerate(PLANS[design.plan]) if i >= DIAGNOSED]
     own = np.array([key["held_out"]["f"][name] for name in MOTION]) ** 2
-    return {"after": gap_of(Aircraft(parts=parts), flights, own),
-            "own_after": gap_of(Aircraft(design.baseline, parts), flights, own),
-            "flown": {name: size for name, _, size in parts}, "not_flown": lacking}
+    return {"after": gap_of(Aircraft(model.factors, model.parts, model.terms), flights, own),
+            "effects_after": gap_of(Aircraft(parts=model.parts), flights, own),
+            "own_after": gap_of(Aircraft(design.baseline, model.parts), flights, own),
+            "flown": {name: size for name, _, size in model.parts}, "not_flown": list(model.lacking)}
 
 
 def true_parts(key: dict[str, Any]) -> Parts:
@@ -86,25 +92,80 @@ def true_parts(key: dict[str, Any]) -> Parts:
     return tuple(zip(key["effects"], key["forms"], sizes, strict=True))
 
 
-def told(answer: dict[str, Any]) -> tuple[Parts, list[str]]:
-    """Effects of an answer as parts of an aircraft; those (and their parameters) that the generator lacks.
+@dataclass(frozen=True)
+class Told:
+    """An answer's model in the generator's terms.
 
-    Nothing where the verdict is not "explained": then the model stays as it was.
+    Attributes:
+        parts: effects, all in the library's form.
+        factors: its derivatives and mass over the published ones, by name.
+        terms: what it adds to numbers of the airframe and the instruments, by name.
+        lacking: what the generator has no number for.
     """
-    if answer.get("verdict") != "explained":
-        return (), []
-    named = [h for h in answer["hypotheses"] if h["effects"]]
-    first: dict[str, Any] = max(named, key=lambda h: h["probability"], default={"effects": []})
-    described = {entry["name"]: entry["parameters"] for entry in answer["effects"]}
-    parts, lacking = list[tuple[str, str, float]](), list[str]()
-    for name in first["effects"]:
-        for parameter, value in described.get(name, {}).items():
-            full = name if name in BY_NAME and BY_NAME[name].parameter == parameter else f"{name}.{parameter}"
-            if full in BY_NAME:
-                parts.append((full, "same", float(value["estimate"])))
-            else:
-                lacking.append(full)
-    return tuple(parts), lacking
+
+    parts: Parts
+    factors: dict[str, float]
+    terms: dict[str, float]
+    lacking: tuple[str, ...]
+
+
+def told(answer: dict[str, Any]) -> Told:
+    """What the command of an answer says; nothing where there is none."""
+    parts, factors, terms = list[tuple[str, str, float]](), dict[str, float](), dict[str, float]()
+    lacking = list[str]()
+    for name, values in _effects(answer.get("resimulate", {}).get("command", "")):
+        if name == "derivatives":
+            factors |= {key: 1.0 + value for key, value in values.items()}
+        elif name == "discrepancy":
+            more, missing = linear(values)
+            terms |= more
+            lacking += missing
+        else:
+            for parameter, value in values.items():
+                full = name if name in BY_NAME and BY_NAME[name].parameter == parameter else f"{name}.{parameter}"
+                if full in BY_NAME:
+                    parts.append((full, "same", value))
+                else:
+                    lacking.append(full)
+    return Told(tuple(parts), factors, terms, tuple(lacking))
+
+
+def _effects(command: str) -> list[tuple[str, dict[str, float]]]:
+    """`--effect NAME:PARAM=VALUE,...` of a command."""
+    found = []
+    for name, values in re.findall(r"--effect (\w+):(\S+)", command):
+        pairs = (pair.split("=") for pair in values.split(","))
+        found.append((name, {key: float(value) for key, value in pairs}))
+    return found
+
+
+def linear(values: dict[str, float]) -> tuple[dict[str, float], list[str]]:
+    """Terms of `discrepancy` as numbers of the generator, multiplied out about `at_*`, and those that it lacks.
+
+    Coefficients are lines in angles, rates and surfaces here (the axial one a parabola in alpha), channels have a bias
+    and some a scale.
+    """
+    found, lacking = dict[str, float](), list[str]()
+    for name, value in values.items():
+        if value == 0.0 or name.startswith("at_"):
+            continue
+        of, _, term = name.partition("_")
+        factors = [] if of in ("bias", "scale") or term == "0" else term.split("_")
+        about = [values.get(f"at_{factor}", 0.0) for factor in factors]
+        more = {name: value}
+        if of == "scale":
+            more[f"bias_{term}"] = -value * values.get(f"at_{term}", 0.0)
+        elif factors == ["alpha", "alpha"]:
+            more = {f"{of}_alpha2": value, f"{of}_alpha": -2.0 * value * about[0], f"{of}_0": value * about[0] ** 2}
+        elif len(factors) == 1:
+            more[f"{of}_0"] = -value * about[0]
+        more = {key: added for key, added in more.items() if added != 0.0}
+        if not set(more) <= LINES:
+            lacking.append(f"discrepancy.{name}")
+            continue
+        for key, added in more.items():
+            found[key] = found.get(key, 0.0) + added
+    return found, lacking
 
 
 def main() -> None:

@@ -21,6 +21,10 @@ import numpy as np
 DETECTABLE, APART, SAME = 6.0, 5.0, 3.5  # D to none; D beyond which a rival is another; D within which it is not
 BINS, LOWEST, HIGHEST = 15, 0.02, 0.98
 HARMLESS = ("slow", "between", "engines", "powerless")  # what formats allow
+# Gap before, the least that is one, gap of the truth, gap of the answer.
+CLOSURES = {"published": ("before", "spread", "own_oracle", "after"),
+            "effects_alone": ("before", "spread", "oracle", "effects_after"),
+            "own": ("own_before", "noise", "own_oracle", "own_after")}  # fmt: skip
 Case = dict[str, Any]
 
 
@@ -94,17 +98,17 @@ def _faulty(answer: dict[str, Any], key: dict[str, Any]) -> dict[str, Any]:
 def _closures(key: dict[str, Any], flown: dict[str, Any] | None) -> dict[str, tuple[float, float] | None]:
     """Closure of the answer and of the truth; None where not flown again or where there is no gap to close.
 
-    `published`: from the published aircraft, a gap being what exceeds that of the spread; `own`: from the aircraft with
+    `published`: all that the answer changes in the published aircraft, beside the true aircraft; `effects_alone`: these
+    beside the true ones. A gap is what exceeds that of the spread. `own`: effects alone from the aircraft with
     its own spread, a gap being what exceeds noise and gust.
     """
-    found: dict[str, tuple[float, float] | None] = {"published": None, "own": None}
+    found: dict[str, tuple[float, float] | None] = dict.fromkeys(CLOSURES)
     if flown is None:
         return found
     held = key["held_out"]
-    for kind, least, prefix in (("published", "spread", ""), ("own", "noise", "own_")):
-        before = held[f"{prefix}before"]
-        if before > held[least]:
-            found[kind] = (1.0 - flown[f"{prefix}after"] / before, 1.0 - held[f"{prefix}oracle"] / before)
+    for kind, (gap, least, true, after) in CLOSURES.items():
+        if held[gap] > held[least] and after in flown:
+            found[kind] = (1.0 - flown[after] / held[gap], 1.0 - held[true] / held[gap])
     return found
 
 
@@ -217,7 +221,8 @@ def figures(cases: Sequence[Case]) -> dict[str, Any]:
         "mean_set_size": share([c["size"] for c in cases if not c["failed"]]),
         "parameter_coverage95": share([c["interval"] for c in cases]),
         "log_score": float(np.mean([-math.log(max(c["p_truth"], 1e-6)) for c in cases])) if cases else None,
-        **_closed(cases, "published", ""), **_closed(cases, "own", "_own"),
+        **_closed(cases, "published", ""), **_closed(cases, "effects_alone", "_effects"),
+        **_closed(cases, "own", "_own"),
         "closure_told_median": float(np.median(closures)) if closures else None,
         "seconds_per_case": float(np.mean(seconds)) if seconds else None,
     }  # fmt: skip

@@ -1,0 +1,45 @@
+"""The model's own numbers, where they settled beside what was found: the records' word on this aircraft's derivatives.
+
+An effect alone leaves the gap that these make: they are off by some 5 % in any aircraft, and no effect takes that away.
+The records that show the effect show them too; they are fitted with it in any case, and here they are flown with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from icing_env.effects.derivatives import NUMBERS
+from sim2real.closing.discrepancy import Description
+from sim2real.closing.remedy import Remedy
+from sim2real.library.candidates import LEAST, Nuisance
+from sim2real.posterior.hypotheses import Hypothesis, Settled
+
+EFFECT = "derivatives"  # by which they are flown
+
+
+def with_own_numbers(alone: Remedy, explained: Hypothesis | None, described: Description | None,
+                     moves: Sequence[Nuisance]) -> Remedy:  # fmt: skip
+    """What an explanation changes, in an aircraft with derivatives and mass as they settled beside it.
+
+    Args:
+        alone: of `remedy`; where nothing can be flown of an explanation, what settled beside it is not believed.
+        explained: the explanation; without a flight of it nothing settled.
+        described: its terms, if they are flown; derivatives at their component are among the terms then.
+        moves: the nuisances.
+    """
+    if not alone.values or explained is None or explained.settled is None:
+        return alone
+    settled = explained.settled
+    if described is not None and described.values and described.nuisances is not None:
+        settled = replace(settled, nuisances=described.nuisances)
+    numbers = own_numbers(settled, moves)
+    return replace(numbers, values=numbers.values | alone.values, covariance=alone.covariance)
+
+
+def own_numbers(settled: Settled, moves: Sequence[Nuisance]) -> Remedy:
+    """The aircraft with derivatives and mass as they settled, and nothing else changed."""
+    own = {move.parameter: (max(move.factor * float(size), LEAST - 1.0), move.factor * float(error))
+           for move, size, error in zip(moves, settled.nuisances, settled.error, strict=True)
+           if move.parameter in NUMBERS}  # fmt: skip
+    return Remedy({EFFECT: {name: change for name, (change, _) in own.items()}}, own=own)
