@@ -16,17 +16,10 @@ from sim2real.actuators.surfaces import placed
 from sim2real.actuators.timing import in_step
 from sim2real.answer import credible, describe, detection_limits, judge, problems, provenance, ranked
 from sim2real.baseline.references import Baseline, fit_baseline
+from sim2real.change import changed, flown_freely
 from sim2real.closing import gap
-from sim2real.closing.discrepancy import describe_unknown, described, in_other_form
-from sim2real.closing.own_numbers import with_own_numbers
-from sim2real.closing.remedy import Remedy, leading, remedy, resimulation, values_of
-from sim2real.closing.whole_model import (
-    components_with,
-    fit_whole_model,
-    incomplete,
-    takes_most,
-    with_whole_model,
-)
+from sim2real.closing.remedy import Remedy, resimulation, values_of
+from sim2real.closing.whole_model import components_with
 from sim2real.ladder import ladder
 from sim2real.library.candidates import Bank, bank, not_testable
 from sim2real.library.terms import in_common
@@ -36,7 +29,7 @@ from sim2real.planning.manoeuvre import next_manoeuvre
 from sim2real.posterior.hypotheses import Posterior
 from sim2real.records.instruments import with_recorder
 from sim2real.records.reconstruct import Reconstruction, reconstruct
-from sim2real.records.side_by_side import algebra_in_one_thread, each
+from sim2real.records.side_by_side import algebra_in_one_thread
 from sim2real.rollout import Rollout, flying_as
 from sim2real.signatures.evidence import Evidence
 from sim2real.weigh import Progress, fit
@@ -116,83 +109,48 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     others = _reconstructed(held_out, baseline, simulator)
     untestable = not_testable(flights, candidates)
     evidences, posterior = fit(flights, candidates, untestable, baseline, progress)
-    verdict, hypotheses = judge(posterior)
-    explained, described_by = leading(verdict, posterior), described(posterior)
-    if explained is not None and explained.unknown is not None:
-        described_by = explained
-    unknown = None
-    if described_by is not None:
-        progress("describing what the library lacks")
-        unknown = describe_unknown(flights, candidates, evidences, baseline, posterior.tempering, described_by)
-    form = None
-    if explained is not None and (own := in_other_form(explained)) is not None:
-        progress("describing the form of what was found")
-        form = describe_unknown(flights, candidates, evidences, baseline, posterior.tempering, own)
-    terms = form or (unknown if explained and explained.unknown else None)
-    alone = remedy(explained, terms)
-    progress("flying the records freely, before and after")
-    sigmas = [e.sigma_w for e in evidences]
-    training = effects_alone = _flown_freely(flights, sigmas, alone, seed)
-    change, whole = with_own_numbers(alone, explained, terms, candidates.nuisances), None
-    if not (reference or simulator) and incomplete(posterior, effects_alone):
-        progress("fitting all numbers of the model, since what was found is not all")
-        fitted = fit_whole_model(flights, candidates, posterior)
-        closer = _flown_freely(flights, sigmas, fitted.remedy(), seed)
-        if takes_most(effects_alone, closer):
-            training = closer
-            posterior, change, whole = with_whole_model(posterior, fitted), fitted.remedy(), fitted
-            verdict, hypotheses = judge(posterior)
-            explained, form = leading(verdict, posterior), None
-            alone = remedy(explained, None)
-            effects_alone = replace(closer, after=gap.of_all(flights, alone, change.paths))
-    if whole is None:
-        training = replace(effects_alone, after=gap.of_all(flights, change, change.paths))
+    found = changed(flights, candidates, evidences, baseline, posterior, seed, not (reference or simulator), progress)
+    posterior, explained, change = found.posterior, found.told.explained, found.change
     sizes = dict[str, History]()
-    if explained is not None and explained.effects and whole is None:
+    if explained is not None and explained.effects and found.whole is None:
         progress("looking at how the sizes went along the records")
-        sizes = histories(flights, candidates, evidences, baseline, posterior, explained.fit, alone)
+        sizes = histories(flights, candidates, evidences, baseline, posterior, explained.fit, found.alone)
     progress("flying what these records could have revealed")
     shown = limits(evidences, candidates, baseline, posterior.tempering, posterior.fits)
-    sigma = float(np.mean(sigmas))
-    tested = _flown_freely(others, [sigma] * len(others), change, seed + 1000) if others else None
-    less = gap.of_all(others, alone, change.paths) if others else None
-    rungs = {"ladder": ladder(flights, others, candidates, baseline, evidences, posterior, explained, alone, change,
-                              tested, seed, progress)} if climb and tested is not None else {}  # fmt: skip
-    enters_at = {name: effect.enters_at for name, effect in effects.LIBRARY.items()}
-    places = components(posterior, enters_at)
-    if whole is not None:
-        places = components_with(places, whole)
-    lacking = whole or unknown
+    sigma = float(np.mean([e.sigma_w for e in evidences]))
+    tested = flown_freely(others, [sigma] * len(others), change, seed + 1000) if others else None
+    less = gap.of_all(others, found.alone, change.paths) if others else None
+    rungs = {"ladder": ladder(flights, others, candidates, baseline, evidences, posterior, explained, found.alone,
+                              change, tested, seed, progress)} if climb and tested is not None else {}  # fmt: skip
+    places = components(posterior, {name: effect.enters_at for name, effect in effects.LIBRARY.items()})
+    if found.whole is not None:
+        places = components_with(places, found.whole)
+    lacking = found.whole or found.told.unknown
+    verdict, hypotheses = judge(posterior)
     progress("looking for what to fly next")
     return Diagnosis(
         verdict=verdict,
         hypotheses=hypotheses,
         credible_set_95=credible([h["probability"] for h in hypotheses]),
-        where={"channels": gap.by_channel(training.before), "components": places,
+        where={"channels": gap.by_channel(found.training.before), "components": places,
                "regimes": regimes(evidences)},
-        effects=[describe(name, posterior, explained, form, sizes.get(name, SAME))
+        effects=[describe(name, posterior, explained, found.told.form, sizes.get(name, SAME))
                  for name, p in ranked(posterior) if p >= LISTED],
         not_testable=[{"effect": name, "why": why} for name, why in sorted(untestable.items())],
         detection_limits=detection_limits(posterior.fits, shown),
         unknown=None if lacking is None else lacking.answer(),
-        gap={"training": {"before": gap.g(training.before, training.alone),
-                          "after": gap.g(training.after, training.alone),
-                          "after_effects_alone": gap.g(effects_alone.after, effects_alone.alone)},
+        gap={"training": {"before": gap.g(found.training.before, found.training.alone),
+                          "after": gap.g(found.training.after, found.training.alone),
+                          "after_effects_alone": gap.g(found.effects_alone.after, found.effects_alone.alone)},
              "held_out": gap.held_out(tested, seed, less)} | rungs,
         next_manoeuvre=_next(flights[0], candidates, posterior, hypotheses, sigma),
-        resimulate=resimulation(change, training, flights, evidences),
+        resimulate=resimulation(change, found.training, flights, evidences),
         data_problems=problems((*flights, *others)),
         provenance=provenance(flights, others, evidences, without, len(reference), seed)
         | {"tempering": posterior.tempering, "model": baseline.answer() if reference else None},
         seconds=time.perf_counter() - began,
-        details=Details(tuple(flights), tuple(others), tuple(evidences), posterior, change, training, tested),
+        details=Details(tuple(flights), tuple(others), tuple(evidences), posterior, change, found.training, tested),
     )
-
-
-def _flown_freely(flights: Sequence[Reconstruction], sigmas: Sequence[float], change: Remedy, seed: int) -> gap.Energy:
-    """Energies of all records under the model and under the model changed."""
-    return gap.together(each(lambda i, f, sigma: gap.energies(f, change, sigma, seed + i, change.paths),
-                             range(len(flights)), flights, sigmas))
 
 
 def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, simulator: Rollout | None

@@ -35,7 +35,7 @@ def test_what_is_lost_with_gains_of_its_own_is_kept_as_it_was(monkeypatch, ratio
         found.posterior = posterior("alpha_bias", left, tempering=2.0)
 
     monkeypatch.setattr(_Weighing, "judged_anew", lambda self: judged_anew())
-    monkeypatch.setattr(_Weighing, "refine", lambda self: refine())
+    monkeypatch.setattr(_Weighing, "refine", lambda self, before: refine())
     found.refine_anew(lambda text: None)
     assert found.posterior.best.effects == (best,)
     assert found.evidences == ["first" if best == "pitch_trim" else "second"]

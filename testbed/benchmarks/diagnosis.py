@@ -186,8 +186,8 @@ def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[s
              "identifiable_pairs", "identifiable_pair_exact_set", "unknown_auroc_5_to_8",
              "unknown_auroc_above_8", "unknown_tpr_at_5_fpr", "where_f1", "ece", "coverage95",
              "mean_set_size", "parameter_coverage95", "closure_median", "closure_p10", "oracle_fraction",
-             "closure_own_median", "closure_own_p10", "oracle_fraction_own", "closure_told_median",
-             "seconds_per_case")  # fmt: skip
+             "closure_effects_median", "closure_effects_p10", "oracle_fraction_effects", "closure_own_median",
+             "closure_own_p10", "oracle_fraction_own", "closure_told_median", "seconds_per_case")  # fmt: skip
 
     def text(value: Any) -> str:
         return "-" if value is None else f"{value}" if isinstance(value, int) else f"{value:.3f}"

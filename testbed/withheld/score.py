@@ -21,7 +21,8 @@ import numpy as np
 DETECTABLE, APART, SAME = 6.0, 5.0, 3.5  # D to none; D beyond which a rival is another; D within which it is not
 BINS, LOWEST, HIGHEST = 15, 0.02, 0.98
 HARMLESS = ("slow", "between", "engines", "powerless")  # what formats allow
-# Gap before, the least that is one, gap of the truth, gap of the answer.
+# Gap before, the least that is one (that of the spread, or of noise and gust), gap of the truth, gap of the answer: of
+# all that it changes in the published aircraft, of its effects alone, of these in the aircraft with its own spread.
 CLOSURES = {"published": ("before", "spread", "own_oracle", "after"),
             "effects_alone": ("before", "spread", "oracle", "effects_after"),
             "own": ("own_before", "noise", "own_oracle", "own_after")}  # fmt: skip
@@ -96,12 +97,7 @@ def _faulty(answer: dict[str, Any], key: dict[str, Any]) -> dict[str, Any]:
 
 
 def _closures(key: dict[str, Any], flown: dict[str, Any] | None) -> dict[str, tuple[float, float] | None]:
-    """Closure of the answer and of the truth; None where not flown again or where there is no gap to close.
-
-    `published`: all that the answer changes in the published aircraft, beside the true aircraft; `effects_alone`: these
-    beside the true ones. A gap is what exceeds that of the spread. `own`: effects alone from the aircraft with
-    its own spread, a gap being what exceeds noise and gust.
-    """
+    """Closure of the answer and of the truth, as CLOSURES; None where not flown again or no gap is to be closed."""
     found: dict[str, tuple[float, float] | None] = dict.fromkeys(CLOSURES)
     if flown is None:
         return found

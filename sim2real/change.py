@@ -1,0 +1,113 @@
+"""What an explanation changes in the model, and how it is told: effects, terms that nothing else says, own numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from sim2real.answer import judge
+from sim2real.baseline.references import Baseline
+from sim2real.closing import gap
+from sim2real.closing.discrepancy import Description, describe_unknown, described, in_other_form
+from sim2real.closing.own_numbers import with_own_numbers
+from sim2real.closing.remedy import Remedy, leading, remedy
+from sim2real.closing.whole_model import WholeModel, fit_whole_model, incomplete, takes_most, with_whole_model
+from sim2real.library.candidates import Bank
+from sim2real.posterior.hypotheses import Hypothesis, Posterior
+from sim2real.records.reconstruct import Reconstruction
+from sim2real.records.side_by_side import each
+from sim2real.signatures.evidence import Evidence
+from sim2real.weigh import Progress
+
+
+@dataclass(frozen=True)
+class Told:
+    """The explanation that the verdict rests on, in terms.
+
+    Attributes:
+        explained: it; None for no gap.
+        unknown: what the library lacks, likely or not; None where that is improbable.
+        form: how the effects differ from the library's; None where they do not.
+    """
+
+    explained: Hypothesis | None
+    unknown: Description | None
+    form: Description | None
+
+    @property
+    def flown(self) -> Description | None:
+        """The terms that are flown with the effects."""
+        return self.form or (self.unknown if self.explained is not None and self.explained.unknown else None)
+
+
+@dataclass(frozen=True)
+class Changed:
+    """What is changed in the model, and what that leaves of the gap on the diagnosed records.
+
+    Attributes:
+        posterior: with many numbers at once among its explanations, if that is the answer.
+        told: the explanation.
+        whole: the model with all its numbers fitted, if that is the answer.
+        alone, effects_alone: the effects alone, the model's own numbers as they were, and what they leave.
+        change, training: all that is changed, and what it leaves.
+    """
+
+    posterior: Posterior
+    told: Told
+    whole: WholeModel | None
+    alone: Remedy
+    effects_alone: gap.Energy
+    change: Remedy
+    training: gap.Energy
+
+
+def changed(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
+            posterior: Posterior, seed: int, any_aircraft: bool, progress: Progress) -> Changed:  # fmt: skip
+    """What the records ask to be changed.
+
+    Args:
+        flights, candidates, evidences, baseline: the diagnosed records, and what was flown along them.
+        posterior: what they say.
+        seed: of the synthetic records behind the gap without a gap.
+        any_aircraft: whether all numbers of the model may be another's.
+        progress: told what is being done.
+    """
+    told = _told(flights, candidates, evidences, baseline, posterior, progress)
+    alone, sigmas = remedy(told.explained, told.flown), [e.sigma_w for e in evidences]
+    progress("flying the records freely, before and after")
+    left = flown_freely(flights, sigmas, alone, seed)
+    if any_aircraft and incomplete(posterior, left):
+        progress("fitting all numbers of the model, since what was found is not all")
+        whole = fit_whole_model(flights, candidates, posterior)
+        change = whole.remedy()
+        closer = flown_freely(flights, sigmas, change, seed)
+        if takes_most(left, closer):
+            posterior = with_whole_model(posterior, whole)
+            told = Told(leading(judge(posterior)[0], posterior), told.unknown, None)
+            alone = remedy(told.explained, None)
+            left = replace(closer, after=gap.of_all(flights, alone, change.paths))
+            return Changed(posterior, told, whole, alone, left, change, closer)
+    change = with_own_numbers(alone, told.explained, told.flown, candidates.nuisances)
+    training = replace(left, after=gap.of_all(flights, change, change.paths))
+    return Changed(posterior, told, None, alone, left, change, training)
+
+
+def _told(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
+          posterior: Posterior, progress: Progress) -> Told:  # fmt: skip
+    explained, lacking = leading(judge(posterior)[0], posterior), described(posterior)
+    if explained is not None and explained.unknown is not None:
+        lacking = explained
+    unknown, form = None, None
+    if lacking is not None:
+        progress("describing what the library lacks")
+        unknown = describe_unknown(flights, candidates, evidences, baseline, posterior.tempering, lacking)
+    if explained is not None and (own := in_other_form(explained)) is not None:
+        progress("describing the form of what was found")
+        form = describe_unknown(flights, candidates, evidences, baseline, posterior.tempering, own)
+    return Told(explained, unknown, form)
+
+
+def flown_freely(flights: Sequence[Reconstruction], sigmas: Sequence[float], change: Remedy, seed: int) -> gap.Energy:
+    """Energies of all records under the model and under the model changed."""
+    return gap.together(each(lambda i, f, sigma: gap.energies(f, change, sigma, seed + i, change.paths),
+                             range(len(flights)), flights, sigmas))
