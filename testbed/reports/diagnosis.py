@@ -150,6 +150,12 @@ def _closing(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> Non
     channels = [c for c in OVERLAID if flight.has(c)]
     report.figure(time_histories(series, channels, {"record": "truth", "before": "iced", "after": "protected"}),
                   f"The first {what} record and its free simulation, restarted every 10 s.")
+    if model := result["resimulate"]["model"]:
+        report.table(["number", "changed by", "standard error"],
+                     [[name, f"{100.0 * own['change']:+.1f} %", f"{100.0 * own['std_error']:.1f} %"]
+                      for name, own in sorted(model.items(), key=lambda item: -abs(item[1]["change"]))],
+                     "The model's own numbers as they settled beside the explanation, flown with it: change of each. A "
+                     "standard error of 5 % (mass: 1 %) means that these records say nothing of it.")
 
 
 def _ladder(report: Report, ladder: Mapping[str, Any]) -> None:
