@@ -88,7 +88,7 @@ def changed(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
             left = replace(closer, after=gap.of_all(flights, alone, change.paths))
             return Changed(posterior, told, whole, alone, left, change, closer)
     change = with_own_numbers(alone, told.explained, told.flown, candidates.nuisances)
-    training = replace(left, after=gap.of_all(flights, change, change.paths))
+    training = left if change is alone else replace(left, after=gap.of_all(flights, change, change.paths))
     return Changed(posterior, told, None, alone, left, change, training)
 
 

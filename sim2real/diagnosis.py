@@ -118,10 +118,13 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     progress("flying what these records could have revealed")
     shown = limits(evidences, candidates, baseline, posterior.tempering, posterior.fits)
     sigma = float(np.mean([e.sigma_w for e in evidences]))
-    tested = flown_freely(others, [sigma] * len(others), change, seed + 1000) if others else None
-    less = gap.of_all(others, found.alone, change.paths) if others else None
-    rungs = {"ladder": ladder(flights, others, candidates, baseline, evidences, posterior, explained, found.alone,
-                              change, tested, seed, progress)} if climb and tested is not None else {}  # fmt: skip
+    tested, less, rungs = None, None, dict[str, Any]()
+    if others:
+        tested = flown_freely(others, [sigma] * len(others), change, seed + 1000)
+        less = tested.after if change is found.alone else gap.of_all(others, found.alone, change.paths)
+        if climb:
+            rungs["ladder"] = ladder(flights, others, candidates, baseline, evidences, posterior, explained,
+                                     change.paths, tested, less, seed, progress)  # fmt: skip
     places = components(posterior, {name: effect.enters_at for name, effect in effects.LIBRARY.items()})
     if found.whole is not None:
         places = components_with(places, found.whole)

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from icing_env.record import FloatArray
 from sim2real.actuators.paths import driven
 from sim2real.baseline.references import Baseline
 from sim2real.closing import black_box, gap
@@ -34,14 +35,17 @@ Rung = dict[str, Any]
 
 
 def ladder(flights: Sequence[Reconstruction], others: Sequence[Reconstruction], candidates: Bank, baseline: Baseline,
-           evidences: Sequence[Evidence], posterior: Posterior, explained: Hypothesis | None, alone: Remedy,
-           change: Remedy, tested: gap.Energy, seed: int, progress: Progress = lambda text: None) -> dict[str, Any]:
+           evidences: Sequence[Evidence], posterior: Posterior, explained: Hypothesis | None, paths: gap.Paths,
+           tested: gap.Energy, effects_alone: FloatArray, seed: int,
+           progress: Progress = lambda text: None) -> dict[str, Any]:
     """Every rung on the held-out records.
 
     Args:
         flights, others: diagnosed and held-out records.
-        explained, alone, change: the diagnosed explanation, its effects, and what is changed in the model with them.
-        tested: residual energies of the held-out records before and after `change`.
+        explained: the diagnosed explanation.
+        paths: of `gap.energies`, those that it enters.
+        tested: residual energies of the held-out records before and after all that it changes.
+        effects_alone: what its effects alone leave [windows, channels].
         seed: of synthetic records and intervals.
 
     Returns:
@@ -51,14 +55,13 @@ def ladder(flights: Sequence[Reconstruction], others: Sequence[Reconstruction], 
     """
     progress("climbing the evidence ladder: the runner-up")
     rival = runner_up(posterior, explained)
-    paths = change.paths
     second = _remedy_of(rival, flights, candidates, evidences, baseline, posterior)
     settled = next((h.settled for h in posterior.hypotheses if not h.effects and h.unknown is None), None)
     numbers = Remedy() if settled is None else own_numbers(settled, candidates.nuisances)
-    names, diagnosed = _names(explained), tested.after
     left = {"nothing": ([], tested.before), "numbers alone": ([], gap.of_all(others, numbers, paths)),
             "runner-up": (_names(rival), gap.of_all(others, second, paths)),
-            "effects alone": (names, gap.of_all(others, alone, paths)), "diagnosed": (names, diagnosed)}  # fmt: skip
+            "effects alone": (_names(explained), effects_alone),
+            "diagnosed": (_names(explained), tested.after)}  # fmt: skip
     progress("climbing the evidence ladder: a regression that knows no physics")
     box = black_box.train([driven(f, f.parameters, paths) for f in flights])
     pushed = [gap.squares(f, Remedy(), paths, partial(black_box.Pushed, box, driven(f, f.parameters, paths)))

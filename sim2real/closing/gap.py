@@ -129,17 +129,16 @@ def held_out(energy: Energy | None, seed: int, effects_alone: FloatArray | None 
     out: dict[str, object] = dict.fromkeys(keys)
     if energy is None:
         return out
-    out["before"], out["after"] = g(energy.before, energy.alone), g(energy.after, energy.alone)
+    gap, left = g(energy.before, energy.alone), {"": g(energy.after, energy.alone)}
+    if effects_alone is not None:
+        left["_effects_alone"] = g(effects_alone, energy.alone)
+    out |= {"before": gap} | {f"after{which}": value for which, value in left.items()}
     before, after = by_channel(energy.before), by_channel(energy.after)
     out["by_channel"] = {c: {"before": before[c], "after": after[c]} for c in before}
-    if effects_alone is not None:
-        out["after_effects_alone"] = g(effects_alone, energy.alone)
     out["worst_channel"] = max(after, key=lambda c: after[c])
-    if g(energy.before, energy.alone) > null_quantile(energy.alone):
-        out["closure"] = 1.0 - float(out["after"]) / float(out["before"])  # type: ignore[arg-type]
+    if gap > null_quantile(energy.alone):
+        out |= {f"closure{which}": 1.0 - value / gap for which, value in left.items()}
         out["closure_low95"], out["closure_high95"] = _interval(energy, seed)
-        if effects_alone is not None:
-            out["closure_effects_alone"] = 1.0 - float(out["after_effects_alone"]) / float(out["before"])  # type: ignore[arg-type]
     return out
 
 

@@ -31,7 +31,7 @@ def with_own_numbers(alone: Remedy, explained: Hypothesis | None, described: Des
     if not alone.values or explained is None or explained.settled is None:
         return alone
     settled = explained.settled
-    if described is not None and described.values and described.nuisances is not None:
+    if described is not None and described.nuisances is not None:
         settled = replace(settled, nuisances=described.nuisances)
     numbers = own_numbers(settled, moves)
     return replace(numbers, values=numbers.values | alone.values, covariance=alone.covariance)
