@@ -160,9 +160,10 @@ def _closing(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> Non
 
 def _ladder(report: Report, ladder: Mapping[str, Any]) -> None:
     report.figure(ladder_gaps(ladder),
-                  "The evidence ladder: the gap left on the held-out records by the model as it is, by the best "
-                  "explanation that shares nothing with the diagnosed one, by the diagnosed one, and by a regression "
-                  "that knows no physics. Whiskers: 95 % intervals over windows. Dashed: what noise and gusts alone "
+                  "The evidence ladder: the gap left on the held-out records by the model as it is, by the model's own "
+                  "numbers refined without any effect, by the best explanation that shares nothing with the diagnosed "
+                  "one, by the diagnosed effects alone and with the numbers beside them, and by a regression that "
+                  "knows no physics. Whiskers: 95 % intervals over windows. Dashed: what noise and gusts alone "
                   "stay below 95 times in 100.")
     none = ladder["no_gap"]
     report.text(f"On synthetic records without a gap the same search picks {', '.join(none['effects'])} as its best "

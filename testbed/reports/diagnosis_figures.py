@@ -49,7 +49,8 @@ def ladder_gaps(ladder: Mapping[str, Any]) -> Figure:
             axes.annotate(f"{100.0 * rung['closure']:.0f} % closed", (max(end, rung["gap"]), y), (6, 0),
                           textcoords="offset points", va="center")  # fmt: skip
     axes.axvline(ladder["noise95"], **ROLES["limit"])
-    names = {"nothing": "nothing: the model", "black box": "black box: no physics"}
+    names = {"nothing": "nothing: the model", "numbers alone": "numbers alone: no effect",
+             "black box": "black box: no physics"}  # fmt: skip
     axes.set_yticks(range(len(rungs)), [names.get(r["name"], f"{r['name']}: {', '.join(r['effects'])}") for r in rungs])
     axes.set_xlim(0.0, 1.18 * max(r["gap"] for r in rungs))
     axes.set_xlabel("gap on the held-out records (tolerances)")
