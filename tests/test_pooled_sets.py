@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import tarfile
 from pathlib import Path
 
 import pytest
@@ -10,6 +12,7 @@ from test_withheld_score import answer, key, write
 
 from icing_env.errors import InputError
 from testbed.benchmarks.pooled_sets import pooled
+from testbed.benchmarks.published_sets import publish, unpack
 from testbed.withheld import files
 
 RIGHT, WRONG = "effect_1", "effect_2"
@@ -61,3 +64,40 @@ def test_changed_keys_are_told(tmp_path):
     changed.write_text(changed.read_text().replace(RIGHT, WRONG))
     with pytest.raises(InputError, match="1 cases are not those of the manifest, the first is a000"):
         pooled([tmp_path / "a"])
+
+
+def test_a_published_set_is_scored_as_the_folder_was(tmp_path):
+    folders = [a_set(tmp_path / "a", 3, 1), a_set(tmp_path / "b", 1, 2)]
+    publish(folders[0], tmp_path / "a.tar.xz")
+    assert pooled([tmp_path / "a.tar.xz", folders[1]]) == pooled(folders)
+    restored = unpack(tmp_path / "a.tar.xz", tmp_path / "restored")
+    for sealed in (folders[0] / "keys").iterdir():
+        assert (restored / "keys" / sealed.name).read_bytes() == sealed.read_bytes()
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_keys_changed_before_publishing_are_told(tmp_path):
+    changed = a_set(tmp_path / "a", 2, 0) / "keys" / "a000.json"
+    changed.write_text(changed.read_text().replace(RIGHT, WRONG))
+    publish(tmp_path / "a", tmp_path / "a.tar.xz")
+    with pytest.raises(InputError, match="keys of 1 cases are not those of the manifest, the first is a000"):
+        pooled([tmp_path / "a.tar.xz"])
+
+
+@pytest.mark.parametrize("name", ["../outside.json", "answers/../../x.json", "/etc/x.json", "answers/a.pkl"])
+def test_a_file_with_foreign_members_is_refused(tmp_path, name):
+    with tarfile.open(tmp_path / "a.tar.xz", "w:xz") as archive:
+        archive.addfile(tarfile.TarInfo(name), io.BytesIO(b""))
+    with pytest.raises(InputError, match="no file of a published set"):
+        pooled([tmp_path / "a.tar.xz"])
+
+
+def test_what_is_no_published_set_is_told(tmp_path):
+    (tmp_path / "a.tar.xz").write_bytes(b"not a tar file")
+    with pytest.raises(InputError, match="not a published set"):
+        pooled([tmp_path / "a.tar.xz"])
+    whole = a_set(tmp_path / "b", 20, 20)
+    publish(whole, tmp_path / "b.tar.xz")
+    (tmp_path / "cut.tar.xz").write_bytes((tmp_path / "b.tar.xz").read_bytes()[:400])
+    with pytest.raises(InputError, match="not a published set"):
+        pooled([tmp_path / "cut.tar.xz"])

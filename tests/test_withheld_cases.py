@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -139,6 +140,13 @@ def test_records_are_read_and_carry_no_label(tmp_path):
     read = [record.read(path) for path in sorted((tmp_path / "0a1b").glob("*.csv"))]
     assert [r.meta.role for r in read] == ["diagnose"] * 3 + ["held_out"] * 2
     assert read[0].meta.mass == 4951.0 and len(read[0]) == 2001
+
+
+def test_records_are_drawn_again_beside_their_keys(tmp_path, only_nulls):
+    sealed = generate.generate(tmp_path, 3)
+    shutil.rmtree(tmp_path / "records")
+    assert generate.generate(tmp_path, 3) == sealed
+    assert files.tampered(tmp_path / "records", tmp_path / "keys", sealed) == []
 
 
 def test_names_of_a_sealed_set_are_random_and_in_no_order(tmp_path, only_nulls):

@@ -16,6 +16,7 @@ from typing import Any
 
 from icing_env.errors import InputError
 from testbed.benchmarks.ledger import enter, enter_draw
+from testbed.benchmarks.published_sets import publish
 from testbed.rivals import RIVALS
 from testbed.withheld.draw import DEVELOPMENT_SEED
 from testbed.withheld.files import read_json, tampered, write_text
@@ -32,7 +33,8 @@ Progress = Callable[[str], None]
 
 @a_core_each()
 def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Progress,
-            without: bool = False, rivals: bool = False, ledger: Path | None = None) -> dict[str, Any]:
+            without: bool = False, rivals: bool = False, ledger: Path | None = None,
+            published: Path | None = None) -> dict[str, Any]:
     """Draw (or finish drawing) a set in `out`, diagnose every case, fly the answers again, score.
 
     Args:
@@ -44,6 +46,7 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
         without: diagnose some single effects again, their own effect left out of the library.
         rivals: let every rival (`testbed.rivals`) answer too, into `answers_NAME`; what stands there is scored anyway.
         ledger: file that is told, by a line each, of the set once it is drawn and of its figures.
+        published: file that the set is published in once it is scored (`published_sets`).
 
     Raises:
         InputError: `out` holds another set, or its files are not those of its manifest.
@@ -66,6 +69,8 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
     found |= {"set": kind_of(committed), "sources": committed["sources"]}
     if ledger is not None:
         enter(ledger, found, out)
+    if published is not None:
+        publish(out, published)
     return found
 
 
@@ -89,12 +94,12 @@ def _drawn(out: Path, cases: int, seed: int | None, workers: int, progress: Prog
     return committed | {"sources": source_hash("sim2real")}
 
 
-def untouched(out: Path, committed: Mapping[str, Any]) -> None:
-    """Raises an InputError unless the records and keys in `out` are those of its manifest."""
-    wrong = tampered(out / "records", out / "keys", committed)
+def untouched(out: Path, committed: Mapping[str, Any], records: bool = True) -> None:
+    """Raises an InputError unless the keys (and records) in `out` are those of its manifest."""
+    wrong = tampered(out / "records" if records else None, out / "keys", committed)
     if wrong:
-        raise InputError(f"{out}: records or keys of {len(wrong)} cases are not those of the manifest, "
-                         f"the first is {wrong[0]}")
+        raise InputError(f"{out}: {'records or ' if records else ''}keys of {len(wrong)} cases are not those of the "
+                         f"manifest, the first is {wrong[0]}")
 
 
 def kind_of(committed: Mapping[str, Any]) -> str:

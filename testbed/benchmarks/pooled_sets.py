@@ -9,27 +9,30 @@ from typing import Any
 
 from icing_env.errors import InputError
 from testbed.benchmarks.diagnosis import kind_of, untouched
+from testbed.benchmarks.published_sets import PARTS, manifest_of, unpack
 from testbed.withheld.files import read_json
 from testbed.withheld.refly import FLOWN_AGAIN
 from testbed.withheld.score import score
 
-PARTS = ("answers", "keys", "refly")
 
+def pooled(places: Sequence[Path]) -> dict[str, Any]:
+    """Every figure of `testbed.withheld.score` over the cases of all sets.
 
-def pooled(folders: Sequence[Path]) -> dict[str, Any]:
-    """Every figure of `testbed.withheld.score` over the cases of all folders.
+    Args:
+        places: folders of runs that ended, or files that these were published in (their keys alone are checked).
 
     Raises:
         InputError: a folder is not a set whose every case is answered and flown again, its records or keys are not
             those of its manifest, one is sealed and another is not, or another solver (other sources) answered.
     """
-    sets = [_whole(folder) for folder in folders]
-    for what in ("set", "sources"):
-        values = {entry[what]: folder for folder, entry in zip(folders, sets, strict=True)}
-        if len(values) > 1:
-            told = ", ".join(f"{folder}: {value}" for value, folder in values.items())
-            raise InputError(f"--pool: sets of different {what} ({told}); give those of one solver and kind")
     with TemporaryDirectory() as name:
+        folders = [unpack(at, Path(name) / f"set_{i}") if at.is_file() else at for i, at in enumerate(places)]
+        sets = [_whole(folder, records=folder is at) for folder, at in zip(folders, places, strict=True)]
+        for what in ("set", "sources"):
+            values = {entry[what]: at for at, entry in zip(places, sets, strict=True)}
+            if len(values) > 1:
+                told = ", ".join(f"{at}: {value}" for value, at in values.items())
+                raise InputError(f"--pool: sets of different {what} ({told}); give those of one solver and kind")
         for part in PARTS:
             (Path(name) / part).mkdir()
             for folder in folders:
@@ -40,12 +43,10 @@ def pooled(folders: Sequence[Path]) -> dict[str, Any]:
     return found | sets[0]
 
 
-def _whole(folder: Path) -> dict[str, Any]:
+def _whole(folder: Path, records: bool) -> dict[str, Any]:
     """Kind of a set and sources of its answers, once it is known to be complete."""
-    if not (folder / "manifest.json").is_file():
-        raise InputError(f"--pool {folder}: no manifest.json; give the --out of a run that ended")
-    committed = read_json(folder / "manifest.json")
-    untouched(folder, committed)
+    committed = manifest_of(folder)
+    untouched(folder, committed, records)
     wanted = {part: [name for name in committed["cases"] if part != "refly" or _flown_again(folder, name)]
               for part in ("answers", "refly")}  # fmt: skip
     lacking = [f"{part}/{name}.json" for part, names in wanted.items() for name in names

@@ -21,7 +21,7 @@ EXAMPLE = """icing benchmark speed --json
 icing benchmark characterisation --quick --figure out/reliability.png
 icing benchmark protection --encounters 200 --json
 icing benchmark diagnosis --quick --out out/withheld
-icing benchmark diagnosis --pool out/first --pool out/second
+icing benchmark diagnosis --pool out/first --pool out/second.tar.xz
 icing benchmark diagnosis --jsbsim"""
 
 
@@ -36,8 +36,10 @@ icing benchmark diagnosis --jsbsim"""
 @click.option("--fresh-seed", is_flag=True, help="diagnosis: a sealed set, its seed from the operating system.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/withheld"),
               show_default=True, help="diagnosis: records, keys, answers; an interrupted run goes on from there.")
-@click.option("--pool", multiple=True, type=click.Path(path_type=Path, file_okay=False),
-              help="diagnosis: draw and solve nothing, score the sets of these --out folders together.")
+@click.option("--pool", multiple=True, type=click.Path(path_type=Path),
+              help="diagnosis: draw and solve nothing, score these sets together: --out folders or --publish files.")
+@click.option("--publish", type=click.Path(path_type=Path, dir_okay=False),
+              help="diagnosis: write answers and keys, once scored, to that file (.tar.xz).")
 @click.option("--jsbsim", is_flag=True, help="diagnosis: JSBSim's DHC-6 as the aircraft; 16 cases if not told.")
 @click.option("--jsbsim-root", type=click.Path(file_okay=False), help="diagnosis: a JSBSim tree; else JSBSIM_ROOT.")
 @click.option("--ledger", type=click.Path(path_type=Path, dir_okay=False),
@@ -47,8 +49,8 @@ icing benchmark diagnosis --jsbsim"""
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="diagnosis: processes.")
 def command(name: str, quick: bool, weights: Path | None, figure: Path | None, encounters: int | None,
             only: str | None, cases: int | None, fresh_seed: bool, out: Path, ledger: Path | None, workers: int,
-            without: bool, rivals: bool, pool: tuple[Path, ...], jsbsim: bool, jsbsim_root: str | None,
-            as_json: bool, seed: int) -> None:
+            without: bool, rivals: bool, pool: tuple[Path, ...], publish: Path | None, jsbsim: bool,
+            jsbsim_root: str | None, as_json: bool, seed: int) -> None:
     """Measure the testbed.
 
     `speed`: one aircraft and batches, with and without observer, one thread, beside JSBSim in the same run (if it is
@@ -76,7 +78,7 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
         _pooled(pool, as_json)
         return
     if name == "diagnosis":
-        _diagnosis(quick, cases, None if fresh_seed else seed, out, ledger, workers, without, rivals, as_json)
+        _diagnosis(quick, cases, None if fresh_seed else seed, out, ledger, publish, workers, without, rivals, as_json)
         return
     if name in ("real_flight", "policies"):
         _cases(name, only, as_json)
@@ -112,12 +114,12 @@ def _adaptation(quick: bool, as_json: bool) -> None:
     _show(found, tables(found), as_json)
 
 
-def _diagnosis(quick: bool, cases: int | None, seed: int | None, out: Path, ledger: Path | None, workers: int,
-               without: bool, rivals: bool, as_json: bool) -> None:
+def _diagnosis(quick: bool, cases: int | None, seed: int | None, out: Path, ledger: Path | None,
+               publish: Path | None, workers: int, without: bool, rivals: bool, as_json: bool) -> None:
     from testbed.benchmarks.diagnosis import FULL, QUICK, measure, tables
 
     found = measure(out, cases or (QUICK if quick else FULL), seed, workers, lambda what: click.echo(what, err=True),
-                    without, rivals, ledger)
+                    without, rivals, ledger, publish)
     _show(found, tables(found), as_json)
 
 

@@ -110,7 +110,8 @@ def _make(group: list[tuple[str, Design]], records: Path, keys: Path) -> int:
             if shape is None and design.parts:
                 shape = geometry(*bank_of(design), *design.air)
             texts, key = make_case(name, design, shape)
-            files.write_text(keys / f"{name}.json", json.dumps(key, indent=1))
+            if not (keys / f"{name}.json").is_file():  # of a set that was published, or a draw that was interrupted
+                files.write_text(keys / f"{name}.json", json.dumps(key, indent=1))
             files.write_case(records / name, texts)
     return len(group)
 

@@ -1,0 +1,75 @@
+"""A set that has been scored, in one file that anybody can score again: answers, keys, gaps flown again, manifest.
+
+Answers are kept to DIGITS figures and without the map of where residuals lie, which no figure needs. Keys and manifest
+are as they were. Records are not in it, but the seed is: `testbed.withheld.generate` draws them again beside the keys.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import lzma
+import os
+import re
+import tarfile
+from pathlib import Path
+from typing import Any
+
+from icing_env.errors import InputError
+from testbed.withheld.files import read_json, write_text
+
+PARTS = ("answers", "keys", "refly")
+DIGITS = 6
+MEMBER = re.compile(rf"manifest\.json|(?:{'|'.join(PARTS)})/\w+\.json")
+LARGEST = 10**7  # bytes of one member
+
+
+def publish(folder: Path, path: Path) -> None:
+    """Write the set in `folder`, an --out of a run that ended, as a tar file compressed by xz; whole or not at all."""
+    part = path.with_name(f".{path.name}.{os.getpid()}")
+    with tarfile.open(part, "w:xz") as archive:
+        for member in [folder / "manifest.json", *(f for p in PARTS for f in sorted((folder / p).glob("*.json")))]:
+            answer = member.parent.name == "answers"
+            content = _shortened(member) if answer else member.read_bytes()
+            told = tarfile.TarInfo(str(member.relative_to(folder)))
+            told.size = len(content)
+            archive.addfile(told, io.BytesIO(content))
+    os.replace(part, path)
+
+
+def _shortened(path: Path) -> bytes:
+    answer = json.loads(path.read_text(encoding="utf-8"), parse_float=lambda text: float(f"{float(text):.{DIGITS}g}"))
+    if "where" in answer:
+        answer["where"] = {"components": answer["where"]["components"]}
+    return json.dumps(answer).encode()
+
+
+def unpack(path: Path, into: Path) -> Path:
+    """Unpack a published set into a folder, made if absent, and return that.
+
+    Raises:
+        InputError: it is not such a file.
+    """
+    try:
+        with tarfile.open(path, "r:xz") as archive:
+            for member in archive:
+                if not member.isfile() or not MEMBER.fullmatch(member.name) or member.size > LARGEST:
+                    raise InputError(f"{path}: holds '{member.name}', which is no file of a published set")
+                content = archive.extractfile(member)
+                (into / member.name).parent.mkdir(parents=True, exist_ok=True)
+                write_text(into / member.name, content.read().decode("utf-8") if content else "")
+    except (OSError, tarfile.TarError, lzma.LZMAError, EOFError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a published set ({error}); give a file that --publish wrote") from error
+    return into
+
+
+def manifest_of(folder: Path) -> dict[str, Any]:
+    """The manifest of a set.
+
+    Raises:
+        InputError: there is none.
+    """
+    if not (folder / "manifest.json").is_file():
+        raise InputError(f"{folder}: no manifest.json; give the --out of a run that ended, or a file of --publish")
+    found: dict[str, Any] = read_json(folder / "manifest.json")
+    return found
