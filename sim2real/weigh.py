@@ -145,7 +145,7 @@ class _Weighing:
         if not self.points or linear.tempering != self.posterior.tempering:
             self.posterior = linear
             self.points = screen(self._flying(), self.start, linear, self.places)
-        self.posterior = screened(linear, self.points)
+        self.posterior = screened(linear, self.points, self.candidates.families)
 
     def _gram(self) -> FloatArray:
         """Inner products of all records, tempered, the nuisances' prior among them."""

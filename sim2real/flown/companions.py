@@ -12,7 +12,7 @@ from sim2real.actuators.paths import of_paths, path_gram
 from sim2real.flown.points import Flying, rows_of
 from sim2real.flown.steps import Point, holding
 from sim2real.library.bends import changes
-from sim2real.library.candidates import Bank, parameter_rows
+from sim2real.library.candidates import Bank, parameter_rows, piece_at
 from sim2real.library.sizes import flown_weights
 from sim2real.posterior.attribution import reduce, with_prior
 from sim2real.posterior.devices import apart
@@ -96,8 +96,7 @@ def _library_beside(flying: Flying, fit: SetFit, point: Point, home: Collection[
 
 def _in_bank(fit: EffectFit, candidates: Bank) -> EffectFit:
     """An effect fitted at a few sizes, with the rows of the whole bank: of the piece of its range where it lies."""
-    own = next(f for f in candidates.families if f.effect is fit.family.effect
-               and f.parameter is fit.family.parameter and f.low <= fit.estimate <= f.high)
+    own = piece_at(fit.family, fit.estimate, candidates.families)
     return replace(fit, family=own, weights=flown_weights(own, fit.estimate))
 
 

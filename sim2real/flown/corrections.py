@@ -9,6 +9,7 @@ import numpy as np
 
 from icing_env.record import FloatArray
 from sim2real.flown.steps import Point, bounded_step, ranges, rooms
+from sim2real.library.candidates import Family, piece_at
 from sim2real.library.sizes import in_powers
 from sim2real.posterior.form import SHARES, Form
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
@@ -56,10 +57,13 @@ def _moved(form: Form, now: Hypothesis, then: Hypothesis) -> Form:
     return Form(tuple(gained), tuple(left), tuple(free), bent=tuple(bent), own=form.own)
 
 
-def corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior) -> Hypothesis:
+def corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior, pieces: Sequence[Family]) -> Hypothesis:
     """Evidence and sizes of a set from where it settled: its likelihood is taken as Gaussian there.
 
     Where it does not fly at all, its slopes say nothing, and it is as bad as it was flown.
+
+    Args:
+        pieces: of all parameters' ranges; a set may have settled in others than the linear fit put it.
     """
     none = 0.5 * float(posterior.reduced[0, 0])
     if lost(point, posterior):
@@ -72,7 +76,9 @@ def corrected(hypothesis: Hypothesis, point: Point, posterior: Posterior) -> Hyp
     if k == 0:
         return replace(hypothesis, log_evidence=none - cost, fit=replace(hypothesis.fit, misfit=2.0 * cost))
     slope, information = point.slope[:k] - across @ onto[:, 0], point.information[:k, :k] - across @ onto[:, 1:]
-    fit = _integrated(hypothesis.fit, point, cost, slope, information)
+    own = zip(hypothesis.fit.families, point.sizes, strict=True)
+    placed = replace(hypothesis.fit, families=tuple(piece_at(family, float(size), pieces) for family, size in own))
+    fit = _integrated(placed, point, cost, slope, information)
     log = fit.log_evidence + none
     return replace(hypothesis, log_evidence=log, fit=replace(fit, log_evidence=log))
 
@@ -83,7 +89,7 @@ def lost(point: Point, posterior: Posterior) -> bool:
 
 
 def _integrated(fit: SetFit, point: Point, cost: float, slope: FloatArray, information: FloatArray) -> SetFit:
-    """Prior times a Gaussian likelihood of the sizes; log_evidence is the log of its integral.
+    """Prior times a Gaussian likelihood of the sizes, over their whole ranges; log_evidence is the log of its integral.
 
     Args:
         point: where the set was flown.
@@ -92,7 +98,8 @@ def _integrated(fit: SetFit, point: Point, cost: float, slope: FloatArray, infor
     """
     families, k = fit.families, len(point.sizes)
     size = 1 + max(max(f.rows) for f in families)
-    base, span = in_powers(np.zeros((size, size)), families), ranges(fit)
+    whole = tuple(replace(f, low=f.parameter.low, high=f.parameter.high) for f in families)
+    base, span = in_powers(np.zeros((size, size)), whole), ranges(fit)
     low, high = (room[:k] for room in rooms(fit, point, span))
     step = bounded_step(information, slope, low, high)
     x, best = ((sizes - base.neutral) / base.reach for sizes in (point.sizes, point.sizes + step * span))
@@ -102,4 +109,4 @@ def _integrated(fit: SetFit, point: Point, cost: float, slope: FloatArray, infor
     gram[1:, 0] = gram[0, 1:]
     modes = Modes(np.arange(k)[None], best[None], np.array([cost]), H[None], np.zeros(1))
     found = integrate(replace(base, gram=gram, degree=1), modes, 0)
-    return replace(found, log_evidence=found.log_evidence - 0.5 * float(gram[0, 0]))
+    return replace(found, families=families, log_evidence=found.log_evidence - 0.5 * float(gram[0, 0]))

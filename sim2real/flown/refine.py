@@ -122,7 +122,7 @@ class _Search:
     def _fly(self, i: int) -> None:
         h = self.found[i]
         self.points[i] = self._settled(i, h)
-        self.found[i] = h = corrected(h, self.points[i], self.linear)
+        self.found[i] = h = corrected(h, self.points[i], self.linear, self.flying.candidates.families)
         if lost(self.points[i], self.linear):
             return
         self.left[i] = self.flying.left_over(h.fit, self.points[i])

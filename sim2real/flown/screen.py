@@ -8,7 +8,7 @@ slopes of the flight that the variants were flown about, and so do sets of sever
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from icing_env.record import FloatArray
 from sim2real.flown.corrections import corrected, inherited
 from sim2real.flown.points import Flying
 from sim2real.flown.steps import FARTHEST, Places, Point
+from sim2real.library.candidates import Family
 from sim2real.posterior.forgiveness import forgive
 from sim2real.posterior.form import Form
 from sim2real.posterior.hypotheses import Hypothesis, Posterior, normalised
@@ -47,7 +48,7 @@ def screen(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior:
 
     fly([names for names in known if len(names) < 2])
     for _ in range(TURNS):
-        promising = _promising(posterior, points)
+        promising = _promising(posterior, points, flying.candidates.families)
         if not promising:
             break
         fly(promising)
@@ -60,29 +61,33 @@ def screen(flying: Flying, start: Callable[[Hypothesis], FloatArray], posterior:
     return {names: replace(point, rows=(), slopes=()) for names, point in points.items()}
 
 
-def _promising(posterior: Posterior, points: Points) -> list[tuple[str, ...]]:
+def _promising(posterior: Posterior, points: Points, pieces: Sequence[Family]) -> list[tuple[str, ...]]:
     """Sets that were not flown and look better than the best that was."""
-    found = _inheriting(posterior, points)
+    found = _inheriting(posterior, points, pieces)
     bound = max(h.log_posterior for h in found if h.unknown is None and h.effects in points)
     better = [h for h in found if h.unknown is None and h.log_posterior > bound]
     return [h.effects for h in sorted(better, key=lambda h: -h.log_posterior)[:SETS]]
 
 
-def screened(posterior: Posterior, points: Points) -> Posterior:
-    """The posterior with what was flown in the place of the linear fit; what looks better and was not is left out."""
-    found = _inheriting(posterior, points)
+def screened(posterior: Posterior, points: Points, pieces: Sequence[Family]) -> Posterior:
+    """The posterior with what was flown in the place of the linear fit; what looks better and was not is left out.
+
+    Args:
+        pieces: of `corrected`.
+    """
+    found = _inheriting(posterior, points, pieces)
     bound = max(h.log_posterior for h in found if h.unknown is None and h.effects in points)
     kept = [h for h in found if h.unknown is not None or h.log_posterior <= bound]
     return replace(posterior, hypotheses=normalised(kept, 0.0))
 
 
-def _inheriting(posterior: Posterior, points: Points) -> list[Hypothesis]:
+def _inheriting(posterior: Posterior, points: Points, pieces: Sequence[Family]) -> list[Hypothesis]:
     """Hypotheses as they were flown; sets that were not, as much better as those within them turned out."""
     before = list(posterior.hypotheses)
     flown = [i for i, h in enumerate(before) if h.unknown is None and h.effects in points]
     found = list(before)
     for i in flown:
-        now = corrected(before[i], points[before[i].effects].without_held(), posterior)
+        now = corrected(before[i], points[before[i].effects].without_held(), posterior, pieces)
         found[i] = replace(now, form=_shifted(now.form, now.fit.misfit, before[i].fit.misfit))
     found = inherited(found, before, flown, flown)
     nothing = next(h.fit.misfit for h in found if not h.effects and h.unknown is None)

@@ -136,6 +136,12 @@ def _pieces(effect: Effect, parameter: Parameter) -> list[tuple[tuple[float, ...
     return [(part, low, high) for part, low, high in zip(parts, ends, ends[1:], strict=False)]
 
 
+def piece_at(family: Family, size: float, families: Iterable[Family]) -> Family:
+    """The family of the same parameter, of those in a bank, in whose piece of the range a size lies."""
+    return next((f for f in families if f.effect is family.effect and f.parameter is family.parameter
+                 and f.low <= size <= f.high), family)  # fmt: skip
+
+
 def unbroken(families: Iterable[Family]) -> list[Family]:
     """One family for every parameter, over its whole range, without rows; nodes as if nothing bent."""
     whole = {(f.effect.name, f.parameter.name): f for f in families}
