@@ -11,7 +11,7 @@ import pytest
 from flights import flight_data, lateral, longitudinal, with_channel
 
 from estimators.signals.data_checks import check
-from estimators.signals.flow_checks import _check_calm_side
+from estimators.signals.flow_checks import _check_ay_unit, _check_calm_side
 from icing_env import scenario as scenarios
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, read
@@ -127,3 +127,14 @@ def test_a_late_vane_in_calm_air_does_not_bend_the_factor_of_ay(effect: str, tmp
         check(record)
         with pytest.raises(InputError, match="'ay' looks like ft/s2"):
             check(with_channel(record, "ay", record["ay"] / 0.3048))
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.004, "'beta' looks like degrees"), (0.0204, "'ay' looks like g"),
+                                             (0.027, set()), (0.14, {"ay", "beta"}), (0.5, "'ay' looks like ft/s2")])
+def test_a_side_force_that_lost_four_fifths_is_neither_confirmed_nor_taken_for_one_in_g(share, told):
+    """Ice on the fin and a weak side force beside it made 0.028 of the lift's change with its angle (a sealed set)."""
+    if isinstance(told, set):
+        assert _check_ay_unit("record", share) == told
+        return
+    with pytest.raises(InputError, match=told):
+        _check_ay_unit("record", share)

@@ -27,6 +27,7 @@ EXPLAINED, CALM = 0.3, 0.93  # R2 from which the motion makes the flow's change,
 SIDE = 0.35  # of a unit's ratio: beyond it an attitude that errs explains the factor of ay as well
 IN_DEGREES = 0.4  # growth of lift by itself per unit of alpha
 FEET = 0.4  # side force per beta over lift per alpha: 0.07 (light aircraft) to 0.34 (fighters), 0.14 to 0.2 here
+IN_G, WEAK = 0.022, 0.03  # the same in g (0.014 to 0.02 here), and what a force that lost four fifths may still be
 FEEBLE = 0.25  # rad/s2 per rad of a surface: 4 to 16 on these aircraft
 DEGREES = 180.0 / np.pi
 CONTROLS = {"elevator": ("q", ("alpha", "q")), "aileron": ("p", ("beta", "p", "r", "rudder")),
@@ -175,13 +176,13 @@ def _check_ay_unit(where: str, share: float | None) -> set[str]:
     """
     if share is None:
         return set()
-    for bound, name in ((0.006, "'beta' looks like degrees"), (0.03, "'ay' looks like g")):
+    for bound, name in ((0.006, "'beta' looks like degrees"), (IN_G, "'ay' looks like g")):
         if share < bound:
             raise InputError(f"{where}: column {name}: side force is {share:.3f} of the lift's change with its angle")
     if share > FEET:
         raise InputError(f"{where}: column 'ay' looks like ft/s2: side force is {share:.2f} of the lift's change with "
                          "its angle")  # fmt: skip
-    return {"ay", "beta"}
+    return {"ay", "beta"} if share > WEAK else set()
 
 
 def _check_controls(where: str, grid: Grid) -> set[str]:
