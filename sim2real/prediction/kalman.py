@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from icing_env.jit import entry
 from icing_env.record import FloatArray
@@ -31,6 +33,8 @@ TRANSIENT = 10.0  # s with gains of their own after the start
 SPAN = 1.0  # s along a record that are flown as if at one condition
 ROUGH = 60  # steps after which a gust no longer shows in third differences
 DOUBLINGS = 16  # 65536 steps
+GAP, TIMES = 0.3, 4.0  # s, and times a channel's own interval, beyond which it is absent and not slow (assumed)
+ABSENT = 1e6  # variance of a reading that is not there
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,8 @@ class Gain:
 
     def with_start(self) -> Gain:
         """The same with gains of their own for the first steps, from the uncertainty of the start."""
-        first, _, _ = _recursion(*self.model, _start_covariance(self.sigma), self.duration)
+        always = np.zeros((self.duration, len(self.model[1])))
+        first, _, _ = _recursion(*self.model, _start_covariance(self.sigma), always)
         return replace(self, K=np.concatenate([first, self.K[-1:]]))
 
 
@@ -104,17 +109,19 @@ def follow(flight: Reconstruction, gain: Gain) -> Gain:
     """The same gust intensity with gains along the record, linearised anew every second.
 
     In a bank a gust moves other channels than in level flight; a gain that does not know it leaves innovations
-    coloured just where manoeuvres are, and constant errors of attitude and rates seem to be found there.
+    coloured just where manoeuvres are, and constant errors of attitude and rates seem to be found there. Where a
+    channel is absent for a while, the others tell what it would: without beta, ay tells the gusts from the side.
     """
     steps, each = len(flight.time) - 1, max(round(SPAN / flight.dt), 1)
     spans = [slice(k, min(k + each, steps + 1)) for k in range(0, steps, each)]
     P, (Qw, columns) = _start_covariance(gain.sigma), _gusts(flight, gain.sigma)
+    lost = absent(flight)[1:].astype(float)
     D = gain.model[1][:, columns]
     noise = np.diag(gain.model[3] - D @ Qw @ D.T) * np.maximum(read_share(flight), 1e-3)
     K, S = [], []
     for span, A, C, B in zip(spans, *linearise(flight, spans), strict=True):
         model = _noisy(flight, A, C[:FED_BACK], B, gain.sigma, Qw, noise)
-        here, covariance, P = _recursion(*model, P, min(each, steps - span.start))
+        here, covariance, P = _recursion(*model, P, lost[span.start : span.start + each])
         K.append(np.swapaxes(here, 1, 2))
         S.append(covariance)
     by_channel = np.ascontiguousarray(np.concatenate(K))  # in memory as the loop of the predictor reads them
@@ -122,8 +129,30 @@ def follow(flight: Reconstruction, gain: Gain) -> Gain:
 
 
 def read_share(flight: Reconstruction) -> FloatArray:
-    """Share of the samples at which every fed-back channel was read [FED_BACK]."""
-    return flight.once("read", lambda: np.mean(np.isfinite(flight.measured[:, :FED_BACK]), axis=0))
+    """Share of the samples at which every fed-back channel was read [FED_BACK], of those where it was not absent."""
+    def make() -> FloatArray:
+        read, there = np.isfinite(flight.measured[:, :FED_BACK]), ~absent(flight)
+        return np.sum(read, axis=0) / np.maximum(np.sum(there, axis=0), 1)
+
+    return flight.once("read", make)
+
+
+def absent(flight: Reconstruction) -> NDArray[np.bool_]:
+    """Where a fed-back channel is absent for longer than the time between its readings tells [N, FED_BACK].
+
+    One that was never read is absent nowhere.
+    """
+    return flight.once("absent", lambda: np.column_stack([
+        _absent(np.isfinite(values), flight.dt) for values in flight.measured[:, :FED_BACK].T]))
+
+
+def _absent(read: NDArray[np.bool_], dt: float) -> NDArray[np.bool_]:
+    out, at = np.zeros(len(read), np.bool_), np.flatnonzero(read)
+    if len(at) > 1:
+        longest = max(GAP / dt, TIMES * float(np.median(np.diff(at))))
+        for before, after in pairwise([-1, *at.tolist(), len(read)]):
+            out[before + 1 : after] = after - before > longest
+    return out
 
 
 def _gusts(flight: Reconstruction, sigma: float) -> tuple[FloatArray, list[int]]:
@@ -202,21 +231,29 @@ def _steady(
 
 
 def _recursion(A: FloatArray, C: FloatArray, Q: FloatArray, R: FloatArray, cross: FloatArray, P: FloatArray,
-               steps: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Gains [steps, states, channels] and innovation covariances from the states' covariance `P`, and P after them."""
+               lost: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Gains [steps, states, channels] and innovation covariances from the states' covariance `P`, and P after them.
+
+    Args:
+        lost: one where a channel is absent, else zero [steps, channels].
+    """
+    steps = len(lost)
     K, covariance = np.empty((steps, len(A), len(C))), np.empty((steps, len(C), len(C)))
     after = P.copy()
-    _recurse(np.ascontiguousarray(A), np.ascontiguousarray(C), Q, R, np.ascontiguousarray(cross), after, K, covariance)
+    _recurse(np.ascontiguousarray(A), np.ascontiguousarray(C), Q, R, np.ascontiguousarray(cross), lost, after, K,
+             covariance)
     return K, covariance, after
 
 
 @entry
-def _recurse(A: Any, C: Any, Q: Any, R: Any, cross: Any, P: Any, K: Any, covariance: Any) -> None:
+def _recurse(A: Any, C: Any, Q: Any, R: Any, cross: Any, lost: Any, P: Any, K: Any, covariance: Any) -> None:
     """Riccati's recursion, step by step; P is changed in place."""
     At, Ct = np.ascontiguousarray(A.T), np.ascontiguousarray(C.T)
     for k in range(len(K)):
         PC = np.dot(P, Ct)
         covariance[k] = np.dot(C, PC) + R
+        for c in range(len(C)):
+            covariance[k, c, c] += ABSENT*lost[k, c]
         onto = np.dot(A, PC) + cross
         gain = np.ascontiguousarray(np.linalg.solve(covariance[k], np.ascontiguousarray(onto.T)).T)
         K[k] = gain
