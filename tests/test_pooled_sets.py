@@ -68,12 +68,12 @@ def test_changed_keys_are_told(tmp_path):
 
 def test_a_published_set_is_scored_as_the_folder_was(tmp_path):
     folders = [a_set(tmp_path / "a", 3, 1), a_set(tmp_path / "b", 1, 2)]
-    publish(folders[0], tmp_path / "a.tar.xz")
-    assert pooled([tmp_path / "a.tar.xz", folders[1]]) == pooled(folders)
-    restored = unpack(tmp_path / "a.tar.xz", tmp_path / "restored")
+    publish(folders[0], tmp_path / "new" / "a.tar.xz")
+    assert pooled([tmp_path / "new" / "a.tar.xz", folders[1]]) == pooled(folders)
+    restored = unpack(tmp_path / "new" / "a.tar.xz", tmp_path / "restored")
     for sealed in (folders[0] / "keys").iterdir():
         assert (restored / "keys" / sealed.name).read_bytes() == sealed.read_bytes()
-    assert not list(tmp_path.glob(".*"))
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["a.tar.xz"]
 
 
 def test_keys_changed_before_publishing_are_told(tmp_path):

@@ -26,6 +26,7 @@ LARGEST = 10**7  # bytes of one member
 
 def publish(folder: Path, path: Path) -> None:
     """Write the set in `folder`, an --out of a run that ended, as a tar file compressed by xz; whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}")
     with tarfile.open(part, "w:xz") as archive:
         for member in [folder / "manifest.json", *(f for p in PARTS for f in sorted((folder / p).glob("*.json")))]:
