@@ -147,6 +147,11 @@ def test_records_are_drawn_again_beside_their_keys(tmp_path, only_nulls):
     shutil.rmtree(tmp_path / "records")
     assert generate.generate(tmp_path, 3) == sealed
     assert files.tampered(tmp_path / "records", tmp_path / "keys", sealed) == []
+    manifest = tmp_path / "manifest.json"
+    manifest.write_text(manifest.read_text().replace(min(sealed["cases"].values(), key=str)["records"], "0" * 64))
+    shutil.rmtree(tmp_path / "records")
+    with pytest.raises(ValueError, match="not what its manifest tells"):
+        generate.generate(tmp_path, 3)
 
 
 def test_names_of_a_sealed_set_are_random_and_in_no_order(tmp_path, only_nulls):

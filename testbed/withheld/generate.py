@@ -37,7 +37,7 @@ T = TypeVar("T")
 
 def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
              progress: Callable[[str], None] = lambda text: None) -> dict[str, Any]:
-    """Make (or finish) a sealed set in `out`: `records/`, `keys/`, `manifest.json`.
+    """Make (or finish, or draw again beside its keys) a sealed set in `out`: `records/`, `keys/`, `manifest.json`.
 
     Args:
         out: a folder, made if absent.
@@ -50,7 +50,7 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
         The manifest.
 
     Raises:
-        ValueError: `out` holds another set than the one asked for.
+        ValueError: `out` holds another set than the one asked for, or what is drawn again is not what it was.
     """
     records, keys = out / "records", out / "keys"
     for folder in (records, keys):
@@ -73,6 +73,8 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
                 progress(f"flown {done} of {len(drawn)}")
     sealed = files.manifest(records, keys, names) | {
         "numbers": numbers.digest(), "count": cases, "development_seed": seed if known else None}
+    if (out / "manifest.json").is_file() and files.read_json(out / "manifest.json") != sealed:
+        raise ValueError(f"{out}: what was drawn is not what its manifest tells: another generator, or other versions")
     files.write_text(out / "manifest.json", json.dumps(sealed, indent=1))
     return sealed
 
@@ -195,8 +197,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=None)
     parser.add_argument("--workers", type=int, default=1)
     given = parser.parse_args()
-    with a_core_each():
-        generate(given.out, given.cases, given.seed, given.workers, print)
+    try:
+        with a_core_each():
+            generate(given.out, given.cases, given.seed, given.workers, print)
+    except ValueError as error:
+        parser.error(str(error))
 
 
 if __name__ == "__main__":
