@@ -80,7 +80,15 @@ def test_keys_changed_before_publishing_are_told(tmp_path):
     changed = a_set(tmp_path / "a", 2, 0) / "keys" / "a000.json"
     changed.write_text(changed.read_text().replace(RIGHT, WRONG))
     publish(tmp_path / "a", tmp_path / "a.tar.xz")
-    with pytest.raises(InputError, match="keys of 1 cases are not those of the manifest, the first is a000"):
+    message = r"a\.tar\.xz: keys of 1 cases are not those of the manifest, the first is a000"
+    with pytest.raises(InputError, match=message):
+        pooled([tmp_path / "a.tar.xz"])
+
+
+def test_a_published_set_that_lacks_answers_is_named_as_it_was_given(tmp_path):
+    (a_set(tmp_path / "a", 2, 0) / "answers" / "a001.json").unlink()
+    publish(tmp_path / "a", tmp_path / "a.tar.xz")
+    with pytest.raises(InputError, match=r"a\.tar\.xz: 1 files are not there, the first is answers/a001.json"):
         pooled([tmp_path / "a.tar.xz"])
 
 

@@ -132,7 +132,7 @@ def test_a_late_vane_in_calm_air_does_not_bend_the_factor_of_ay(effect: str, tmp
 @pytest.mark.parametrize(("share", "told"), [(0.004, "'beta' looks like degrees"), (0.0204, "'ay' looks like g"),
                                              (0.027, set()), (0.14, {"ay", "beta"}), (0.5, "'ay' looks like ft/s2")])
 def test_a_side_force_that_lost_four_fifths_is_neither_confirmed_nor_taken_for_one_in_g(share, told):
-    """Ice on the fin and a weak side force beside it made 0.028 of the lift's change with its angle (a sealed set)."""
+    """Ice on the fin was refused as ay in g in two sealed sets, once with a weak side force beside it."""
     if isinstance(told, set):
         assert _check_ay_unit("record", share) == told
         return

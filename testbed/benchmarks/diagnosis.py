@@ -94,12 +94,16 @@ def _drawn(out: Path, cases: int, seed: int | None, workers: int, progress: Prog
     return committed | {"sources": source_hash("sim2real")}
 
 
-def untouched(out: Path, committed: Mapping[str, Any], records: bool = True) -> None:
-    """Raises an InputError unless the keys (and records) in `out` are those of its manifest."""
-    wrong = tampered(out / "records" if records else None, out / "keys", committed)
+def untouched(out: Path, committed: Mapping[str, Any], published: Path | None = None) -> None:
+    """Raises an InputError unless the records and keys in `out` are those of its manifest.
+
+    Args:
+        published: the file that `out` was unpacked from, which has no records and is named in its place.
+    """
+    wrong = tampered(None if published else out / "records", out / "keys", committed)
     if wrong:
-        raise InputError(f"{out}: {'records or ' if records else ''}keys of {len(wrong)} cases are not those of the "
-                         f"manifest, the first is {wrong[0]}")
+        raise InputError(f"{published or out}: {'' if published else 'records or '}keys of {len(wrong)} cases are not "
+                         f"those of the manifest, the first is {wrong[0]}")
 
 
 def kind_of(committed: Mapping[str, Any]) -> str:

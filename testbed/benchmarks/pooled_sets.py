@@ -9,7 +9,7 @@ from typing import Any
 
 from icing_env.errors import InputError
 from testbed.benchmarks.diagnosis import kind_of, untouched
-from testbed.benchmarks.published_sets import PARTS, manifest_of, unpack
+from testbed.benchmarks.published_sets import PARTS, unpack
 from testbed.withheld.files import read_json
 from testbed.withheld.refly import FLOWN_AGAIN
 from testbed.withheld.score import score
@@ -27,7 +27,7 @@ def pooled(places: Sequence[Path]) -> dict[str, Any]:
     """
     with TemporaryDirectory() as name:
         folders = [unpack(at, Path(name) / f"set_{i}") if at.is_file() else at for i, at in enumerate(places)]
-        sets = [_whole(folder, records=folder is at) for folder, at in zip(folders, places, strict=True)]
+        sets = [_whole(folder, at) for folder, at in zip(folders, places, strict=True)]
         for what in ("set", "sources"):
             values = {entry[what]: at for at, entry in zip(places, sets, strict=True)}
             if len(values) > 1:
@@ -43,16 +43,23 @@ def pooled(places: Sequence[Path]) -> dict[str, Any]:
     return found | sets[0]
 
 
-def _whole(folder: Path, records: bool) -> dict[str, Any]:
-    """Kind of a set and sources of its answers, once it is known to be complete."""
-    committed = manifest_of(folder)
-    untouched(folder, committed, records)
+def _whole(folder: Path, given: Path) -> dict[str, Any]:
+    """Kind of a set and sources of its answers, once it is known to be complete.
+
+    Args:
+        given: where the user has it: that folder, or the file that was unpacked there.
+    """
+    if not (folder / "manifest.json").is_file():
+        raise InputError(f"--pool {given}: no manifest.json; give the --out of a run that ended, or a file that "
+                         "--publish wrote")  # fmt: skip
+    committed = read_json(folder / "manifest.json")
+    untouched(folder, committed, None if given == folder else given)
     wanted = {part: [name for name in committed["cases"] if part != "refly" or _flown_again(folder, name)]
               for part in ("answers", "refly")}  # fmt: skip
     lacking = [f"{part}/{name}.json" for part, names in wanted.items() for name in names
                if not (folder / part / f"{name}.json").is_file()]  # fmt: skip
     if lacking:
-        raise InputError(f"--pool {folder}: {len(lacking)} files are not there, the first is {lacking[0]}; "
+        raise InputError(f"--pool {given}: {len(lacking)} files are not there, the first is {lacking[0]}; "
                          "let its run end first")
     answers = (read_json(folder / "answers" / f"{name}.json") for name in committed["cases"])
     sources = sorted({a["provenance"]["sources"] for a in answers if "provenance" in a})

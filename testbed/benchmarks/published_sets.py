@@ -13,10 +13,9 @@ import os
 import re
 import tarfile
 from pathlib import Path
-from typing import Any
 
 from icing_env.errors import InputError
-from testbed.withheld.files import read_json, write_text
+from testbed.withheld.files import write_text
 
 PARTS = ("answers", "keys", "refly")
 DIGITS = 6
@@ -62,15 +61,3 @@ def unpack(path: Path, into: Path) -> Path:
     except (OSError, tarfile.TarError, lzma.LZMAError, EOFError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: not a published set ({error}); give a file that --publish wrote") from error
     return into
-
-
-def manifest_of(folder: Path) -> dict[str, Any]:
-    """The manifest of a set.
-
-    Raises:
-        InputError: there is none.
-    """
-    if not (folder / "manifest.json").is_file():
-        raise InputError(f"{folder}: no manifest.json; give the --out of a run that ended, or a file of --publish")
-    found: dict[str, Any] = read_json(folder / "manifest.json")
-    return found
