@@ -56,6 +56,21 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
     return out + _engine_residuals(flight, parameters)
 
 
+def late_squares(flight: Reconstruction, parameters: NDArray, surface: str, delays: FloatArray,
+                 first: int = 0) -> FloatArray:  # fmt: skip
+    """Whitened square that a path leaves if it answers as one PARAMETERS row has it, but for each of some delays [s].
+
+    Args:
+        first: sample from which it counts.
+    """
+    measured, good = flight.positions[surface], np.isfinite(flight.positions[surface])
+    predicted = follow(flight.commands[f"{surface}_command"], measured[good][0], parameters, surface, flight.dt)[:, 0]
+    time = flight.dt * np.arange(len(predicted))
+    late = np.column_stack([np.interp(time - delay, time, predicted) for delay in delays])
+    left = np.where(good[:, None], measured[:, None] - late, 0.0)
+    return np.asarray(np.sum(_believed(flight, surface, left)[first:] ** 2, axis=0))
+
+
 def moves(flight: Reconstruction, surface: str) -> bool:
     """Whether a surface's command moves and its position was recorded: else its path tells nothing."""
     command = flight.commands.get(f"{surface}_command")

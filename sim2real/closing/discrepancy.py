@@ -22,7 +22,7 @@ from sim2real.baseline.references import Baseline
 from sim2real.flown.settling import nearer
 from sim2real.library.bends import COMPONENTS
 from sim2real.library.candidates import Bank, Nuisance, shifted
-from sim2real.library.terms import DEVIATION, FROM_ZERO, GENERIC, GENERIC_SIZE, unit_of
+from sim2real.library.terms import DEVIATION, FROM_ZERO, GENERIC, GENERIC_SIZE, PURE_DELAY, unit_of
 from sim2real.posterior.attribution import nuisance_mean, reduce, with_prior
 from sim2real.posterior.form import WORTH
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
@@ -35,7 +35,7 @@ from sim2real.signatures.evidence import Evidence, compare
 SHOWN = DETECTABLE  # standard errors that a term has to stand out
 ROUNDS, SETTLED = 8, 0.5  # of fitting at most, each flying the aircraft described so far; whitened square worth one
 RIDGE = 0.1  # prior precision of a term in its own unit (assumed: a standard deviation of three)
-LATE = ("_dot", "acceleration", "slow_phi", "slow_theta", "slow_ax", "slow_ay")  # terms with a memory
+LATE = ("_dot", "acceleration", PURE_DELAY, "slow_phi", "slow_theta", "slow_ax", "slow_ay")  # terms with a memory
 SCALE, DELAY = 0.1, 0.1  # unit of a channel's scale error, and s of its delay
 COEFFICIENT = {component: coefficient for coefficient, component in COMPONENTS.items()}
 ABOUT = ("alpha", "elevator", "airspeed")  # quantities whose deviations from the records' medians are terms

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from icing_env import effects
 from icing_env.record import FloatArray
+from sim2real.actuators.lateness import lateness
 from sim2real.actuators.paths import PATHS, excess, path_gram
 from sim2real.baseline.references import Baseline
 from sim2real.flown.steps import (
@@ -267,7 +268,8 @@ class Flying:
         gram[0, first - n : first] = gram[first - n : first, 0]
         gram[0, 0] += point.nuisances @ precision @ point.nuisances
         gram[1 : 1 + k, 1 : 1 + k] += (0.1 * SIZE_STEP) ** 2 * np.eye(k)  # sizes move by ten uncertainties
-        return Remainder(gram, first, kept, left_in, (*ends(fit, point), *(int(j) for j in 1 + k + point.held)))
+        late = lateness(self.flights, [rows[:1] for rows in moved_to], round(SETTLE / self.flights[0].dt))
+        return Remainder(gram, first, kept, left_in, late, (*ends(fit, point), *(int(j) for j in 1 + k + point.held)))
 
 
 def rows_of(flight: Reconstruction, candidates: Bank, fit: SetFit, sizes: FloatArray, steps: FloatArray,

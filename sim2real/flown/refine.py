@@ -22,6 +22,7 @@ from sim2real.flown.other_form import Bent, flown_unknown, other_form
 from sim2real.flown.points import Flying
 from sim2real.flown.steps import Places, Point
 from sim2real.posterior.any_course import beside, with_courses
+from sim2real.posterior.any_delay import late_fits
 from sim2real.posterior.forgiveness import forgive
 from sim2real.posterior.form import OTHER_FORM, SHARES, WORTH, Form, home, shares, with_terms
 from sim2real.posterior.generic import UnknownFit, fit_unknown_left
@@ -129,7 +130,8 @@ class _Search:
         left = self.left[i].reduced()
         places = home(h.effects) if h.effects else {u.component for u in self.linear.courses if u.log_evidence > 0.0}
         fits = fit_unknown_left(left, self.flying.candidates)
-        self.generic[i] = with_courses(fits, beside(self.flying.courses, self.left[i], places))
+        late = late_fits(self.left[i].late, float(left[0, 0]), self.flying.tempering, home(h.effects))
+        self.generic[i] = with_courses(fits, [*beside(self.flying.courses, self.left[i], places), *late])
         if h.effects:
             self.found[i] = replace(h, form=self._form(i, h), instead=None)
         else:

@@ -71,9 +71,10 @@ BEYOND: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 # One standard deviation of a generic coefficient with a time course of unit size (assumed: a quarter of the change
 # that typical effects of the library make).
 GENERIC_SIZE = {"u": 0.008, "w": 0.03, "v": 0.01, "p": 0.002, "q": 0.015, "r": 0.002}
+PURE_DELAY = "delay"  # what a path may do beside its terms: not linear, so that it is none
 PATH_SIZE = {"1": 0.5 * math.pi / 180.0, "position": 0.1, "acceleration": 0.0025, "inertia": 0.005,
              "position*position*position": 0.1, "direction": 0.25 * math.pi / 180.0,
-             "side": 0.25 * math.pi / 180.0}  # rad, 1, s2, s2, 1, rad, rad (assumed)
+             "side": 0.25 * math.pi / 180.0, PURE_DELAY: 1.0}  # rad, 1, s2, s2, 1, rad, rad (assumed); s
 THRUST_SIZE = 0.1  # (assumed)
 DEVIATION = {"alpha": 0.05, "beta": 0.05, "q": 0.1, "p": 0.2, "r": 0.1, "elevator": 0.04, "aileron": 0.08,
              "rudder": 0.05, "airspeed": 5.0, "CT": 0.015, "phi": 0.2, "theta": 0.1, "ax": 1.0, "ay": 1.0, "az": 2.0,

@@ -25,6 +25,7 @@ from sim2real.flown.steps import FARTHEST
 from sim2real.library.candidates import Bank, Family, shifted, unbroken
 from sim2real.over_time.by_stretch import Way, cut_up, gaussian, products, responses, ways, without
 from sim2real.over_time.history import SPREADS
+from sim2real.posterior.any_delay import is_delay
 from sim2real.posterior.form import forgiven
 from sim2real.posterior.hypotheses import Hypothesis, Posterior, Settled, normalised
 from sim2real.posterior.sets import SetFit
@@ -65,8 +66,8 @@ def varying(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
         centre: nuisances [n] that the variants were flown about.
     """
     best = posterior.best
-    if posterior.none > CERTAIN or best.unknown is None or len(best.effects) > 1:
-        return posterior
+    if posterior.none > CERTAIN or best.unknown is None or len(best.effects) > 1 or is_delay(best.unknown):
+        return posterior  # of what is late, one number says all
     cuts = [cut_up(flight) for flight in flights]
     if len(tried := ways(flights, cuts)[1:]) == 0:  # one short record
         return posterior

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.special import logsumexp, softmax
 
 from icing_env.record import FloatArray
+from sim2real.posterior.any_delay import is_delay
 from sim2real.posterior.devices import within
 from sim2real.posterior.form import LEAST, Form, at_home
 from sim2real.posterior.generic import UnknownFit
@@ -176,7 +177,7 @@ def is_home(h: Hypothesis, unknown: UnknownFit, told: float, explained: float, r
         told, explained: whitened square that the terms and the effect explain.
         raw: inner products of all rows of the bank.
     """
-    if len(h.effects) != 1 or h.unknown is not None or not at_home(unknown.component, h.effects):
+    if len(h.effects) != 1 or h.unknown is not None or not at_home(unknown.component, h.effects) or is_delay(unknown):
         return False
     if foreign(h.effects[0], unknown, raw) and explained < SHAPE * told:
         return False

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from icing_env.record import FloatArray
+from sim2real.actuators.lateness import Late
 from sim2real.actuators.paths import PATHS
 from sim2real.library.terms import Term, at_any_time, pushes
 from sim2real.prediction.predictor import Push
@@ -33,6 +34,7 @@ class Remainder:
         first: the first of these.
         rows: those before it, of every record, in parts side by side [N x channels, first], but for the paths.
         excess: whitened square above noise that is left in paths, by component.
+        late: delays that would take most of what paths leave, by component.
         held: nuisances (by row) that are as far as they may be, and give way no more.
     """
 
@@ -40,6 +42,7 @@ class Remainder:
     first: int
     rows: Sequence[Sequence[FloatArray]]
     excess: dict[str, float]
+    late: dict[str, Late]
     held: tuple[int, ...] = ()
 
     def reduced(self) -> FloatArray:

@@ -1,0 +1,76 @@
+"""Surfaces that answer whole and late: a pure delay between command and position, which no lag and no limit is.
+
+A transport delay (a digital actuator loop, slack that is taken up first, a hydraulic line) leaves the shape of an
+answer as it was. Lags and limits say much of one, by shapes that it has not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from icing_env.record import FloatArray
+from sim2real.actuators.paths import counted, late_squares, moves
+from sim2real.records.channels import SURFACES
+from sim2real.records.reconstruct import Reconstruction
+
+LONGEST, APART = 0.5, 0.02  # s: the latest answer looked for, and how far apart those tried first are (assumed)
+FINE = 1e-4  # s, to which the best is found
+
+
+@dataclass(frozen=True)
+class Late:
+    """The delay of a surface that leaves least.
+
+    Attributes:
+        delay, error: s; the error where noise is one.
+        gain: whitened square that it takes of what the path leaves without.
+        left: that it leaves above noise.
+    """
+
+    delay: float
+    error: float
+    gain: float
+    left: float
+
+
+def lateness(flights: Sequence[Reconstruction], rows: Sequence[NDArray], first: int = 0) -> dict[str, Late]:
+    """The delay of every surface whose path leaves more than noise, by component.
+
+    Args:
+        rows: one PARAMETERS row for each record.
+        first: sample from which they count.
+    """
+    found = {}
+    for surface in SURFACES:
+        there = [(f, row) for f, row in zip(flights, rows, strict=True) if moves(f, surface)]
+
+        def square(delays: FloatArray, there: Sequence[tuple[Reconstruction, NDArray]] = there,
+                   surface: str = surface) -> FloatArray:  # fmt: skip
+            return np.sum([late_squares(f, row, surface, delays, first) for f, row in there], axis=0)
+
+        if there and (late := _best(square, sum(counted(f, len(f.time) - first) for f, _ in there))) is not None:
+            found[f"{surface}_path"] = late
+    return found
+
+
+def _best(square: Callable[[FloatArray], FloatArray], noise: float) -> Late | None:
+    """The delay that leaves least; none where nothing is left without, or the best is none."""
+    tried = np.arange(0.0, LONGEST + 0.5 * APART, APART)
+    if square(tried[:1])[0] <= noise:
+        return None
+    squares = square(tried)
+    k = int(np.argmin(squares))
+    if k == 0:
+        return None
+    near = (tried[k - 1], tried[min(k + 1, len(tried) - 1)])
+    delay = float(minimize_scalar(lambda x: float(square(np.array([x]))[0]), bounds=near, method="bounded",
+                                  options={"xatol": FINE}).x)  # fmt: skip
+    before, least, after = square(np.array([delay - APART, delay, delay + APART]))
+    bend = max((before + after - 2.0 * least) / APART**2, 1e-9)
+    error = min(float(np.sqrt(2.0 / bend)), LONGEST)
+    return Late(delay, error, float(squares[0] - least), max(float(least) - noise, 0.0))

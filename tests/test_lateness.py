@@ -1,0 +1,85 @@
+"""A surface that answers whole and late is no lag, and a lag, of whatever order, is not merely late."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from icing_env import effects, scenario
+from icing_env.record import FlightRecord
+from sim2real.actuators.lateness import lateness
+from sim2real.diagnosis import diagnose
+from sim2real.posterior.any_delay import late_fits
+from sim2real.records.channels import SURFACES
+from sim2real.records.reconstruct import reconstruct
+from testbed.flight import fly
+
+NATURAL = 8.0  # rad/s of an actuator of second order
+
+
+@cache
+def flown(seed: int = 4) -> FlightRecord:
+    """Doublets of all three surfaces."""
+    chosen = scenario.load("clear_air", duration=52.0, parameters={"turbulence_sigma_w": 0.5})
+    return fly(chosen, seed=seed, observer=False, protection=False).record
+
+
+def asked_early(seed: int, surface: str, samples: int) -> FlightRecord:
+    """The record with a surface's command that many samples before the surface answers it: all else is as flown."""
+    record = flown(seed)
+    command = record.channels[f"{surface}_command"]
+    early = np.concatenate([command[samples:], np.repeat(command[-1:], samples)])
+    return replace(record, channels=record.channels | {f"{surface}_command": early})
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+@pytest.mark.parametrize("samples", [4, 11])
+def test_a_delay_is_found_as_long_as_it_is(surface: str, samples: int):
+    flights = [reconstruct(asked_early(seed, surface, samples)) for seed in (4, 5)]
+    found = lateness(flights, [f.parameters for f in flights])
+    assert list(found) == [f"{surface}_path"]
+    late = found[f"{surface}_path"]
+    assert late.delay == pytest.approx(samples * flights[0].dt, abs=0.004)
+    assert late.left < 0.05 * late.gain
+
+
+def test_surfaces_that_answer_as_published_are_not_late():
+    flights = [reconstruct(flown(seed)) for seed in (4, 5)]
+    assert late_fits(lateness(flights, [f.parameters for f in flights]), 0.0, 1.0) == []
+
+
+def test_a_lag_of_second_order_is_more_than_late():
+    flight = reconstruct(flown())
+    dt, command = flight.dt, flight.commands["elevator_command"]
+    a = np.array([1.0 + NATURAL * dt * (1.4 + NATURAL * dt), -2.0 - 1.4 * NATURAL * dt, 1.0])
+    position = command[0] + lfilter([(NATURAL * dt) ** 2], a, command - command[0])
+    flight = replace(flight, positions=flight.positions | {"elevator": position})
+    found = lateness([flight], [flight.parameters])
+    assert found["elevator_path"].gain > 100.0  # a delay says much of it
+    assert late_fits(found, 0.0, 1.0) == []  # and not enough
+
+
+def test_a_first_order_lag_is_more_than_late():
+    flight = reconstruct(flown())
+    lagging = effects.with_effects(flight.parameters, {"rudder_lag": {"extra": -0.04}})  # of the model, behind which
+    found = lateness([flight], [lagging])  # the aircraft lags
+    assert late_fits(found, 0.0, 1.0) == []
+
+
+def test_what_is_late_where_something_known_enters_is_its_affair():
+    flight = reconstruct(asked_early(4, "elevator", 8))
+    found = lateness([flight], [flight.parameters])
+    assert [u.component for u in late_fits(found, 0.0, 1.0)] == ["elevator_path"]
+    assert late_fits(found, 0.0, 1.0, {"elevator_path"}) == []
+
+
+def test_an_elevator_that_answers_late_is_told_as_that_and_not_as_a_lag():
+    found = diagnose([asked_early(seed, "elevator", 7) for seed in (4, 5, 6)])
+    assert found.verdict == "unknown"
+    assert found.unknown is not None
+    assert (found.unknown["component"], found.unknown["kind"]) == ("elevator_path", "dynamic")
+    (term,) = found.unknown["terms"]
+    assert term["term"] == "delay"
+    assert term["coefficient"] == pytest.approx(0.14, abs=0.005)
