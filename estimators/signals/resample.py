@@ -54,13 +54,13 @@ def common_grid(record: FlightRecord) -> Grid:
             continue
         at = record.time[valid]
         values[name] = np.interp(time, at, samples[valid])
-        gaps = _gaps(time, at)
+        lost = gaps(time, at)
         if not valid.all() and (name in FAST or not _slow(np.flatnonzero(valid))):
             kind = f"{int(np.sum(~valid))} of {len(valid)} samples missing, interpolated"
             problems.append(DataProblem(name, kind, *_span(record.time[~valid]), True))
-        if gaps.any():
-            missing[name] = gaps
-            problems.append(DataProblem(name, "gap, left out", *_span(time[gaps]), True))
+        if lost.any():
+            missing[name] = lost
+            problems.append(DataProblem(name, "gap, left out", *_span(time[lost]), True))
     return Grid(time, dt, values, missing, tuple(problems))
 
 
@@ -70,10 +70,14 @@ def _slow(rows: NDArray[np.intp]) -> bool:
     return len(step) > 0 and int(step.min()) > 1 and int(step.max()) <= int(step.min()) + 1
 
 
-def _gaps(time: FloatArray, at: FloatArray) -> NDArray[np.bool_]:
-    """Rows of `time` that lie in a gap between the instants `at` of valid samples, or too far outside them."""
+def gaps(time: FloatArray, at: FloatArray, least: float = GAP) -> NDArray[np.bool_]:
+    """Rows of `time` that lie in a gap between the instants `at` of valid samples, or too far outside them.
+
+    Args:
+        least: s that a gap lasts; longer where samples are sparse.
+    """
     usual = float(np.median(np.diff(at))) if len(at) > 1 else 0.0
-    limit = max(GAP, 4.0 * usual)
+    limit = max(least, 4.0 * usual)
     after = np.searchsorted(at, time)
     left, right = at[np.clip(after - 1, 0, None)], at[np.clip(after, None, len(at) - 1)]
     inside = (right - left > limit) & (time > left) & (time < right)

@@ -138,8 +138,9 @@ def _pieces(effect: Effect, parameter: Parameter) -> list[tuple[tuple[float, ...
 
 def piece_at(family: Family, size: float, families: Iterable[Family]) -> Family:
     """The family of the same parameter, of those in a bank, in whose piece of the range a size lies."""
+    inside = float(np.clip(size, family.parameter.low, family.parameter.high))
     return next((f for f in families if f.effect is family.effect and f.parameter is family.parameter
-                 and f.low <= size <= f.high), family)  # fmt: skip
+                 and f.low <= inside <= f.high), family)  # fmt: skip
 
 
 def unbroken(families: Iterable[Family]) -> list[Family]:

@@ -192,6 +192,8 @@ def _course(flight: Reconstruction, name: str, aerodynamic: bool = False) -> Flo
 
 def _values(flight: Reconstruction, factor: str) -> FloatArray:
     """A regressor: a control, both engines' power as a thrust coefficient, a channel, or its derivative."""
+    if factor == "CT" and flight.power_from == "balance":
+        return np.zeros(len(flight.time))  # of the alpha and ax of which that power is made, it says nothing new
     if factor == "CT":
         both = flight.controls["power_left"] + flight.controls["power_right"]
         return np.asarray(both / (flight.channel("airspeed") * _pressed_area(flight)))

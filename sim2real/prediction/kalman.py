@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.signals.resample import gaps
 from icing_env.jit import entry
 from icing_env.record import FloatArray
 from icing_env.turbulence import pair_noise, scales
@@ -33,7 +33,7 @@ TRANSIENT = 10.0  # s with gains of their own after the start
 SPAN = 1.0  # s along a record that are flown as if at one condition
 ROUGH = 60  # steps after which a gust no longer shows in third differences
 DOUBLINGS = 16  # 65536 steps
-GAP, TIMES = 0.3, 4.0  # s, and times a channel's own interval, beyond which it is absent and not slow (assumed)
+GAP = 0.3  # s that a channel that is absent, and not slow, has not been read (assumed)
 ABSENT = 1e6  # variance of a reading that is not there
 
 
@@ -142,17 +142,11 @@ def absent(flight: Reconstruction) -> NDArray[np.bool_]:
 
     One that was never read is absent nowhere.
     """
-    return flight.once("absent", lambda: np.column_stack([
-        _absent(np.isfinite(values), flight.dt) for values in flight.measured[:, :FED_BACK].T]))
+    def lost(values: FloatArray) -> NDArray[np.bool_]:
+        read = np.isfinite(values)
+        return gaps(flight.time, flight.time[read], GAP) if read.any() else read
 
-
-def _absent(read: NDArray[np.bool_], dt: float) -> NDArray[np.bool_]:
-    out, at = np.zeros(len(read), np.bool_), np.flatnonzero(read)
-    if len(at) > 1:
-        longest = max(GAP / dt, TIMES * float(np.median(np.diff(at))))
-        for before, after in pairwise([-1, *at.tolist(), len(read)]):
-            out[before + 1 : after] = after - before > longest
-    return out
+    return flight.once("absent", lambda: np.column_stack([lost(v) for v in flight.measured[:, :FED_BACK].T]))
 
 
 def _gusts(flight: Reconstruction, sigma: float) -> tuple[FloatArray, list[int]]:
@@ -177,7 +171,7 @@ def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, 
     G, D = A[:, DRYDEN], C[:, DRYDEN]
     driven = np.concatenate([flight.surface_noise, flight.power_noise])
     Q = G @ Qw @ G.T + np.diag(walk**2 * flight.dt) + (B * driven**2) @ B.T + _within_steps(A, Qw)
-    R = np.diag(np.where(read == 0.0, 1e6, np.maximum(noise, least**2) / np.maximum(read, 1e-3)))
+    R = np.diag(np.where(read == 0.0, ABSENT, np.maximum(noise, least**2) / np.maximum(read, 1e-3)))
     return A, C, Q, D @ Qw @ D.T + R, G @ Qw @ D.T
 
 
