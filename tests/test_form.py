@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from icing_env import effects
-from sim2real.library.bends import bends, natural
+from sim2real.library.bends import bends, natural, of_own
 from sim2real.library.candidates import bank
 from sim2real.library.terms import BEYOND, GENERIC, unit_of
 from sim2real.posterior.devices import within
@@ -29,7 +29,7 @@ from sim2real.posterior.generic import UnknownFit, fit_unknown
 from sim2real.posterior.home_terms import gain, without
 from sim2real.posterior.home_terms import given as after_terms
 from sim2real.posterior.hypotheses import Hypothesis, is_home, set_prior
-from sim2real.posterior.likeness import calibration, foreign, is_own
+from sim2real.posterior.likeness import SHAPE, alike, calibration, foreign, is_own, like
 from sim2real.posterior.sets import SetFit
 
 TERMS = 6
@@ -213,6 +213,33 @@ def test_what_small_commands_lose_is_no_form_of_a_gearing():
     assert not is_home(geared, dead, 1000.0, 700.0, raw)
     assert is_home(geared, dead, 1000.0, 900.0, raw)  # what explains nearly all is the cause, whatever is left
     assert is_home(geared, bent, 1000.0, 700.0, raw)
+
+
+def test_terms_are_an_effect_for_their_shape_where_they_are_of_its_own_regressors():
+    """Lift that lags looks like lift and is none of it; a power of its regressor is a derivative that bends."""
+    rows = {term.name: term.row for term in bank().terms if term.component == "z_force"}
+    lift = next(f for f in bank().families if f.effect.name == "lift_slope")
+    raw = np.eye(1 + max(*rows.values(), *lift.rows))
+    one = SetFit((lift,), weights={lift.rows[0]: 1.0})
+    slope, lag = rows["alpha"], rows["alpha_dot"]
+    for row in (slope, lag, rows["alpha*alpha"]):
+        raw[row, lift.rows[0]] = raw[lift.rows[0], row] = 0.95  # the model's own numbers make them alike
+
+    def some(terms: dict[str, float]) -> UnknownFit:
+        return UnknownFit("z_force", 0.0, tuple((name, w, 0.1) for name, w in terms.items()), 0.0,
+                          {rows[name]: w for name, w in terms.items()})
+
+    assert like(one, some({"alpha*alpha": 1.0}), raw, 0.01)
+    assert like(one, some({"alpha": 1.0}), raw, 0.4) and not like(one, some({"alpha": 1.0}), raw, 0.05)
+    assert not like(one, some({"alpha_dot": 1.0}), raw, 0.4)
+    assert alike(one, some({"alpha_dot": 1.0}), raw) > SHAPE
+
+
+def test_the_moment_of_power_at_an_angle_is_not_of_the_moment_of_power_alone():
+    power = effects.LIBRARY["power_pitching"]
+    assert natural(power, "pitching_moment", "alpha*CT") and not of_own(power, "pitching_moment", "alpha*CT")
+    assert of_own(power, "pitching_moment", "CT")
+    assert of_own(effects.LIBRARY["mass_error"], "z_force", "alpha*alpha")  # whatever a load does to it
 
 
 def test_company_neither_widens_nor_narrows_the_form_of_a_member():

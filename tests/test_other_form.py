@@ -215,7 +215,10 @@ def test_something_unknown_is_worth_what_it_is_where_it_is_flown(bent):
     terms = tuple(replace(term, row=1 + j) for j, term in enumerate(flying.candidates.terms))
     found = {u.component: u for u in fit_unknown(flown.left.reduced(), replace(flying.candidates, terms=terms))}
     linear = found["pitching_moment"]
-    there = flown_unknown(flying, SetFit(misfit=0.0), flown, linear)
+    there, point = flown_unknown(flying, SetFit(misfit=0.0), flown, linear)
     assert there.log_evidence > linear.log_evidence and there.misfit < linear.misfit
+    far, near = (float(np.sum(at.settled.nuisances**2)) for at in (flown.point, point))
+    assert near < 0.5 * far  # the model's own numbers have let go of what the terms say
     path = found.get("elevator_path", replace(linear, component="elevator_path"))
-    assert flown_unknown(flying, SetFit(misfit=0.0), flown, path) is path  # judged on commands alone, exactly linear
+    untouched = flown_unknown(flying, SetFit(misfit=0.0), flown, path)  # judged on commands alone, exactly linear
+    assert untouched[0] is path and untouched[1] is flown.point

@@ -90,15 +90,16 @@ def test_what_stretches_the_model_is_not_all():
     noise = np.random.default_rng(0).chisquare(4.0, (20, 6, 12)) / 4.0
     much, none = (gap.Energy(noise[0], noise[0] + more, noise, np.zeros((6, 1))) for more in (5.0, 0.0))
 
-    def told(tempering: float, settled: np.ndarray | None, left: gap.Energy = much) -> bool:
+    def told(tempering: float, settled: np.ndarray | None, left: gap.Energy = much, all_of_it: bool = True) -> bool:
         where = None if settled is None else Settled(settled, np.ones_like(settled))
         best = Hypothesis(SetFit(), None, 0.0, 0.0, settled=where)
         found = Posterior((best,), {}, (), {}, np.zeros((1, 1)), tempering=tempering)
-        return whole_model.incomplete(found, left)
+        return whole_model.incomplete(found, left, all_of_it)
 
     assert told(3.0, None) and not told(1.0, None)
     assert not told(1.0, np.ones(30)) and told(1.0, np.full(30, 1.8))
     assert told(3.0, None, none) and not told(1.0, np.full(30, 1.8), none)  # nothing is left in free flight
+    assert told(3.0, None, much, False) and not told(1.0, np.full(30, 1.8), much, False)  # it was not all flown
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ answer as it was. Lags and limits say much of one, by shapes that it has not.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,8 @@ class Late:
     Attributes:
         delay, error: s; the error where noise is one.
         gain: whitened square that it takes of what the path leaves without.
-        left: that it leaves above noise.
+        left: share of what it explains that it leaves above noise, of whole records, the recorder's low pass as stated:
+            one that gives way makes a delay of a lag of second order.
     """
 
     delay: float
@@ -48,29 +49,34 @@ def lateness(flights: Sequence[Reconstruction], rows: Sequence[NDArray], first: 
     found = {}
     for surface in SURFACES:
         there = [(f, row) for f, row in zip(flights, rows, strict=True) if moves(f, surface)]
-
-        def square(delays: FloatArray, there: Sequence[tuple[Reconstruction, NDArray]] = there,
-                   surface: str = surface) -> FloatArray:  # fmt: skip
-            return np.sum([late_squares(f, row, surface, delays, first) for f, row in there], axis=0)
-
-        if there and (late := _best(square, sum(counted(f, len(f.time) - first) for f, _ in there))) is not None:
-            found[f"{surface}_path"] = late
+        moved, stated = _square(surface, first, there), _square(surface, 0, [(f, f.parameters) for f, _ in there])
+        noise, of_whole = (sum(counted(f, len(f.time) - since) for f, _ in there) for since in (first, 0))
+        if there and (late := _best(moved, noise)) is not None:
+            without, still = stated(np.array([0.0, late.delay]))
+            left = max(still - of_whole, 0.0) / max(without - still, 1e-9)
+            found[f"{surface}_path"] = replace(late, left=float(left))
     return found
 
 
-def _best(square: Callable[[FloatArray], FloatArray], noise: float) -> Late | None:
-    """The delay that leaves least; none where nothing is left without, or the best is none."""
+Square = Callable[[FloatArray], FloatArray]  # whitened squares left with some delays
+
+
+def _square(surface: str, first: int, there: Sequence[tuple[Reconstruction, NDArray]]) -> Square:
+    return lambda delays: np.sum([late_squares(f, row, surface, delays, first) for f, row in there], axis=0)
+
+
+def _best(moved: Square, noise: float) -> Late | None:
+    """The delay that leaves least; none where nothing is left without, or the best is none. `left` is not known yet."""
     tried = np.arange(0.0, LONGEST + 0.5 * APART, APART)
-    if square(tried[:1])[0] <= noise:
+    if moved(tried[:1])[0] <= noise:
         return None
-    squares = square(tried)
+    squares = moved(tried)
     k = int(np.argmin(squares))
     if k == 0:
         return None
     near = (tried[k - 1], tried[min(k + 1, len(tried) - 1)])
-    delay = float(minimize_scalar(lambda x: float(square(np.array([x]))[0]), bounds=near, method="bounded",
+    delay = float(minimize_scalar(lambda x: float(moved(np.array([x]))[0]), bounds=near, method="bounded",
                                   options={"xatol": FINE}).x)  # fmt: skip
-    before, least, after = square(np.array([delay - APART, delay, delay + APART]))
-    bend = max((before + after - 2.0 * least) / APART**2, 1e-9)
-    error = min(float(np.sqrt(2.0 / bend)), LONGEST)
-    return Late(delay, error, float(squares[0] - least), max(float(least) - noise, 0.0))
+    before, least, after = moved(np.array([delay - APART, delay, delay + APART]))
+    error = np.sqrt(2.0 / max((before + after - 2.0 * least) / APART**2, 1e-9))
+    return Late(delay, min(float(error), LONGEST), float(squares[0] - least), np.inf)

@@ -91,13 +91,14 @@ class _Number:
     family: Family | None
 
 
-def incomplete(posterior: Posterior, flown: gap.Energy) -> bool:
+def incomplete(posterior: Posterior, flown: gap.Energy, all_of_it: bool) -> bool:
     """Whether the best explanation leaves much, or takes numbers of the published model along that are too far off.
 
     Args:
         flown: the records in free flight, with that explanation; what only stretches the model leaves a gap there too.
+        all_of_it: whether all of the explanation flew; what did not leaves a gap there for that reason alone.
     """
-    if posterior.tempering > ANOTHER or posterior.settled is None:
+    if posterior.tempering > ANOTHER or posterior.settled is None or not all_of_it:
         return posterior.tempering > ANOTHER
     stretched = float(posterior.settled @ posterior.settled) > chi2.isf(STRETCHED, len(posterior.settled))
     return stretched and gap.g(flown.after, flown.alone) >= gap.null_quantile(flown.alone)

@@ -59,17 +59,20 @@ def other_form(flying: Flying, fit: SetFit, flown: Bent, rows: Sequence[int], sq
     return replace(form, weights=dict(weights)), bent
 
 
-def flown_unknown(flying: Flying, fit: SetFit, flown: Bent, unknown: UnknownFit) -> UnknownFit:
+def flown_unknown(flying: Flying, fit: SetFit, flown: Bent, unknown: UnknownFit) -> tuple[UnknownFit, Point]:
     """Something unknown beside a set, its terms (and nuisances with them) brought to their best where they are flown.
 
     Its evidence is corrected by what all terms of the component together gain there over what the linear fit says.
+
+    Returns:
+        It, and where it was flown: the set's own place if its terms are not flown.
     """
     terms = flying.candidates.terms
     rows = [1 + j for j, term in enumerate(terms) if term.component == unknown.component]
     before = flown.left.reduced()
     rows = [row for row in rows if before[row, row] > 1e-9]
     if not rows or unknown.component.endswith("_path"):
-        return unknown
+        return unknown, flown.point
     bent = bring(flying, fit, flown, rows, np.ones(len(rows)))
     after, misfit = bent.left.reduced(), float(before[0, 0])
     weights = np.array([bent.point.weights.get(terms[row - 1].row, 0.0) for row in rows])
@@ -77,7 +80,7 @@ def flown_unknown(flying: Flying, fit: SetFit, flown: Bent, unknown: UnknownFit)
                           closer=misfit - float(left[0, 0]))
                      for left, at in ((before, np.zeros(len(rows))), (after, weights)))  # fmt: skip
     return replace(unknown, log_evidence=unknown.log_evidence + there.gained[1] - linear.gained[1],
-                   misfit=unknown.misfit + there.left[1] - linear.left[1], weights=dict(bent.point.weights))
+                   misfit=unknown.misfit + there.left[1] - linear.left[1], weights=dict(bent.point.weights)), bent.point
 
 
 def flown_squares(fit: SetFit, flown: Bent) -> tuple[list[float], list[float]]:

@@ -231,16 +231,17 @@ class _Search:
         fits = [u for u in fits if not self._named(u, known)]
         if not fits:
             return []
-        best = max(fits, key=lambda u: u.log_evidence)
+        best, settled = max(fits, key=lambda u: u.log_evidence), self._where(i)
         if not known.effects and best.weights and best.log_evidence > WORTH:
-            flown = flown_unknown(self.flying, known.fit, Bent(self.points[i], self.left[i]), best)
+            flown, point = flown_unknown(self.flying, known.fit, Bent(self.points[i], self.left[i]), best)
             fits = [flown if u is best else u for u in fits]
             best = max(fits, key=lambda u: u.log_evidence)
+            settled = point.settled if best is flown else settled
         more = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
         prior = np.log(P_BESIDE / (1.0 - P_NONE)) + known.log_prior if known.effects else np.log(P_UNKNOWN)
         return [Hypothesis(known.fit, best, float(prior), known.log_evidence + gained + more,
                            Form((0.0,), (best.left,), self._at_liberty(known.fit).free(remainder, best)),
-                           settled=self._where(i))]
+                           settled=settled)]
 
     def _where(self, i: int) -> Settled:
         """Nuisances where a flown set settled, in its other form if it was flown in one."""

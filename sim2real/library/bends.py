@@ -16,7 +16,8 @@ from icing_env import aircraft
 from icing_env.effects import Effect, Parameter
 from icing_env.types import DERIVATIVE_NAMES
 
-COMMON = {"1", "time", "airspeed", "alpha", "CT"}  # what any force or moment may be a function of
+ALWAYS = {"1", "time"}
+COMMON = {*ALWAYS, "airspeed", "alpha", "CT"}  # what any force or moment may be a function of
 COMPONENTS = {"CX": "x_force", "CY": "y_force", "CZ": "z_force", "Cl": "rolling_moment", "Cm": "pitching_moment",
               "Cn": "yawing_moment"}  # fmt: skip
 
@@ -56,6 +57,21 @@ def _alone(effect: Effect, kind: str) -> str:
 
 
 @cache
+def of_own(effect: Effect, component: str, term: str) -> bool:
+    """Whether a generic term is natural to an effect, and made of the regressors of what it changes alone."""
+    own = _regressors(effect) if component in COMPONENTS.values() else set()
+    return natural(effect, component, term) and (not own or set(term.split("*")) <= own | ALWAYS)
+
+
+def _regressors(effect: Effect) -> set[str]:
+    """Of the derivatives that an effect changes, where it changes nothing else but constants; else none."""
+    changed = changes(effect)
+    if not all(name[:2] in (*COMPONENTS, "CD") for name in changed):
+        return set()
+    return {name[3:].rstrip("2") for name in changed} - {"0"}
+
+
+@cache
 def natural(effect: Effect, component: str, term: str) -> bool:
     """Whether a generic term may belong to another form of an effect.
 
@@ -64,15 +80,11 @@ def natural(effect: Effect, component: str, term: str) -> bool:
     an effect that changes nothing else may have any form. An instrument's scale is a function of its own reading, its
     bias of time at most; an error of airspeed with the angle of attack is neither. Other effects may have any form.
     """
-    changed = changes(effect)
     if (channel := scales(effect)) and component == f"sensor:{channel}":
         return set(term.split("*")) <= {"1", "time", channel}
     if (channel := _alone(effect, "bias_")) and component == f"sensor:{channel}":
         return term in ("1", "time")
-    if component not in COMPONENTS.values() or not all(name[:2] in (*COMPONENTS, "CD") for name in changed):
-        return True
-    own = {name[3:].rstrip("2") for name in changed}
-    if own == {"0"}:
+    if component not in COMPONENTS.values() or not (own := _regressors(effect)):
         return True
     own |= COMMON
     if "alphadot" in own:  # in flight hardly another thing than a rate of pitch

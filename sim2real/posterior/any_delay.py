@@ -27,7 +27,7 @@ def late_fits(found: Mapping[str, Late], misfit: float, tempering: float, taken:
     """
     out = []
     for component, late in found.items():
-        if component not in taken and late.left < FORGIVEN**2 * late.gain:
+        if component not in taken and late.left < FORGIVEN**2:
             gain, error = late.gain / tempering, late.error * float(np.sqrt(tempering))
             chance = float(np.log(min(np.sqrt(2.0 * np.pi) * error / LONGEST, 1.0)))
             term = (PURE_DELAY, late.delay, error)

@@ -14,7 +14,7 @@ from sim2real.posterior.any_delay import is_delay
 from sim2real.posterior.devices import within
 from sim2real.posterior.form import LEAST, Form, at_home
 from sim2real.posterior.generic import UnknownFit
-from sim2real.posterior.likeness import MOSTLY, SHAPE, alike, calibration, foreign
+from sim2real.posterior.likeness import MOSTLY, SHAPE, calibration, foreign, like
 from sim2real.posterior.sets import SetFit
 from sim2real.posterior.singles import EffectFit
 
@@ -182,7 +182,8 @@ def is_home(h: Hypothesis, unknown: UnknownFit, told: float, explained: float, r
     if foreign(h.effects[0], unknown, raw) and explained < SHAPE * told:
         return False
     return told > 0.0 and explained > LEAST**2 and (
-        explained > MOSTLY * told or alike(h.fit, unknown, raw) > SHAPE or calibration(h.effects[0], unknown, raw))
+        explained > MOSTLY * told or like(h.fit, unknown, raw, explained / told)
+        or calibration(h.effects[0], unknown, raw))  # fmt: skip
 
 
 def normalised(found: Sequence[Hypothesis], least: float = KEPT) -> tuple[Hypothesis, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from icing_env import effects
 from icing_env.effects import Effect
 from icing_env.record import FloatArray
-from sim2real.library.bends import bends, changes, natural, scales
+from sim2real.library.bends import bends, changes, natural, of_own, scales
 from sim2real.posterior.form import LEAST, SHARES, WORTH, Form, at_home
 from sim2real.posterior.generic import COURSE, UnknownFit
 from sim2real.posterior.sets import SetFit
@@ -18,6 +18,7 @@ FOREIGN = 0.5  # of the shape of generic terms: an effect to which less of it be
 OF_PATH = {"_gearing": ("1", "position", "position*position*position"), "_lag": ("acceleration", "inertia"),
            "_offset": ("1", "airspeed", "alpha", "p", "beta")}  # generic terms that are the like of each of its numbers
 MOSTLY, SHAPE = 0.6, 0.8  # of what generic terms explain, of their shape: an effect that is more of it is what they are
+SOME = 0.2  # of what they explain: an effect that is less of it is not what they are for their shape (assumed)
 
 
 def alike(fit: SetFit, unknown: UnknownFit, raw: FloatArray) -> float:
@@ -35,6 +36,22 @@ def alike(fit: SetFit, unknown: UnknownFit, raw: FloatArray) -> float:
             one = {row: w for row, w in (fit.weights or {}).items() if row in family.rows}
             found.append(_cosine(one, unknown.weights, raw))
     return max(found)
+
+
+def like(fit: SetFit, unknown: UnknownFit, raw: FloatArray, share: float) -> bool:
+    """Whether generic terms are an effect's form for their shape, though it explains the less of what they do.
+
+    Powers of its own regressors are, however little: the line among them may lie within the model's own uncertainty.
+    Of others, what the model's numbers take anyway makes shapes alike (a lift that lags is first of all lift); most
+    must be of the effect's own regressors, and it must explain some.
+
+    Args:
+        share: that the effect explains of what the terms do.
+    """
+    if alike(fit, unknown, raw) <= SHAPE:
+        return False
+    own = {term for term, _, _ in unknown.terms if any(of_own(f.effect, unknown.component, term) for f in fit.families)}
+    return _bent(fit, unknown) or (share > SOME and _share(own, unknown, raw) > SHAPE)
 
 
 def calibration(name: str, unknown: UnknownFit, raw: FloatArray) -> bool:
