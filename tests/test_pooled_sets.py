@@ -8,11 +8,15 @@ import tarfile
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from test_withheld_score import answer, key, write
 
 from icing_env.errors import InputError
+from testbed.benchmarks.diagnosis import tables
+from testbed.benchmarks.failures import failures
 from testbed.benchmarks.pooled_sets import pooled
 from testbed.benchmarks.published_sets import publish, unpack
+from testbed.commands.benchmark import command
 from testbed.withheld import files
 
 RIGHT, WRONG = "effect_1", "effect_2"
@@ -40,6 +44,41 @@ def test_figures_are_those_of_all_cases(tmp_path):
     assert pooled([first])["top1"] == 0.75
     found = pooled([first, second])
     assert (found["cases"], found["top1"], found["set"], found["sources"]) == (8, 0.5, "sealed", "one solver")
+
+
+def test_what_failed_is_listed_with_what_was_there_and_what_was_said(tmp_path):
+    found = pooled([a_set(tmp_path / "a", 2, 1)])
+    (failed,) = found["failures"]
+    assert failed == {"case": "a002", "tier": "single", "sigma_w": 0.0, "D": 20.0, "can_be_told": True,
+                      "truth": f"{RIGHT} (same)", "answer": f"{WRONG}, 0.97"}  # fmt: skip
+    (_, headers, shown) = tables(found)[-1]
+    assert shown == [["single", "0", "20", "yes", f"{RIGHT} (same)", f"{WRONG}, 0.97"]]
+    assert len(headers) == len(shown[0])
+
+
+def test_failures_are_told_by_tier_and_the_farthest_first(tmp_path):
+    unlike = {"D": {RIGHT: 0.0, WRONG: 2.0}}  # an ideal observer could not tell the two
+    fault = {"fault": {"kind": "stuck", "channel": "az", "excused": []}}
+    cases = [(answer([]), key("null", [], 0.0)), (answer([WRONG]), key("null", [], 1.5)),
+             (answer([WRONG]), key("single", [RIGHT], 0.0) | unlike),
+             (answer([], unknown=True), key("single", [RIGHT], 0.5)),
+             (answer([RIGHT]), key("pair", [RIGHT, WRONG], 0.5)),
+             (answer([WRONG]), key("unknown", ["never"], 0.0)),
+             (answer([]), key("unknown", ["never"], 0.5, pair=30.0)),
+             ({"error": "no time"}, key("faults", [], 0.0) | fault)]  # fmt: skip
+    found = failures(*write(tmp_path, cases))
+    assert [(one["tier"], one["D"], one["answer"]) for one in found] == [
+        ("single", 20.0, "something unknown, 0.97"), ("pair", 20.0, f"{RIGHT}, 0.97"),
+        ("unknown", 30.0, "no gap, 0.97"), ("unknown", 10.0, f"{WRONG}, 0.97"), ("null", 20.0, f"{WRONG}, 0.97"),
+        ("faults", 20.0, "refused: no time")]  # fmt: skip
+    assert found[-1]["truth"] == "stuck az, no gap"
+
+
+@pytest.mark.parametrize("asked", [("--pool", "x"), ("--jsbsim",)])
+@pytest.mark.parametrize("option", ["--publish", "--ledger"])
+def test_a_set_that_is_not_drawn_is_not_entered_or_published(asked, option, tmp_path):
+    with pytest.raises(InputError, match=f"{option}: of a set that is drawn and solved; leave it out with {asked[0]}"):
+        CliRunner().invoke(command, ["diagnosis", *asked, option, str(tmp_path / "there")], catch_exceptions=False)
 
 
 def test_only_whole_sets_of_one_solver_and_kind_are_scored_together(tmp_path):

@@ -126,6 +126,13 @@ def test_closure_is_that_of_the_answer_flown_again_and_counts_where_there_is_a_g
     assert found["closure_told_median"] == 0.9
 
 
+def test_an_unknown_is_placed_where_it_is_one_of_the_components_that_it_enters_at(tmp_path):
+    told = [answer([], unknown=True) | {"unknown": {"component": f"place_{n}"}} for n in ("a", "a", "b")]
+    true = [key("unknown", ["a"], 0.0), key("unknown", ["a", "c"], 0.0), key("unknown", ["a"], 0.0)]
+    found = score.score(*write(tmp_path, [*zip(told, true, strict=True), (answer([]), key("unknown", ["a"], 0.0))]))
+    assert found["unknown_placed"] == pytest.approx(2 / 3)  # of those told as unknown
+
+
 def test_calibration_and_auroc_against_numbers_worked_out_by_hand():
     assert score.auroc([2.0, 3.0], [1.0, 2.0]) == pytest.approx(0.875)
     rng = np.random.default_rng(1)

@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from icing_env.errors import InputError
+from testbed.benchmarks.failures import HEADERS, failures
+from testbed.benchmarks.failures import rows as failed_rows
 from testbed.benchmarks.ledger import enter, enter_draw
 from testbed.benchmarks.published_sets import publish
 from testbed.rivals import RIVALS
@@ -66,7 +68,8 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
     progress("scoring")
     there = [out / f"answers_{rival}" for rival in RIVALS if any((out / f"answers_{rival}").glob("*.json"))]
     found = score(out / "answers", out / "keys", out / "refly", out / "answers_without", *there)
-    found |= {"set": kind_of(committed), "sources": committed["sources"]}
+    found |= {"set": kind_of(committed), "sources": committed["sources"],
+              "failures": failures(out / "answers", out / "keys")}  # fmt: skip
     if ledger is not None:
         enter(ledger, found, out)
     if published is not None:
@@ -193,8 +196,8 @@ def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[s
     headers = {"figure": "left", "all": "right", "95 %": "left", "other form": "right", "permuted": "right"}
     names = ("cases", "failed", "identifiable_singles", "top1", "top3", "null_false_alarm", "pair_exact_set",
              "identifiable_pairs", "identifiable_pair_exact_set", "unknown_auroc_5_to_8",
-             "unknown_auroc_above_8", "unknown_tpr_at_5_fpr", "where_f1", "ece", "coverage95",
-             "mean_set_size", "parameter_coverage95", "closure_median", "closure_p10", "oracle_fraction",
+             "unknown_auroc_above_8", "unknown_tpr_at_5_fpr", "unknown_placed", "where_f1", "ece",
+             "coverage95", "mean_set_size", "parameter_coverage95", "closure_median", "closure_p10", "oracle_fraction",
              "closure_effects_median", "closure_effects_p10", "oracle_fraction_effects", "closure_own_median",
              "closure_own_p10", "oracle_fraction_own", "closure_told_median", "seconds_per_case")  # fmt: skip
 
@@ -217,4 +220,5 @@ def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[s
     beside = [[name.replace("_", " "), *(text(figures[column]) for column in shown)]
               for name, figures in compared.items()]  # fmt: skip
     return [(f"diagnosis, {found['set']} set", headers, rows),
-            ("beside others", {"": "left", **{c.replace("_", " "): "right" for c in shown}}, beside)]
+            ("beside others", {"": "left", **{c.replace("_", " "): "right" for c in shown}}, beside),
+            ("what failed", HEADERS, failed_rows(found["failures"]))]

@@ -9,6 +9,7 @@ from typing import Any
 
 from icing_env.errors import InputError
 from testbed.benchmarks.diagnosis import kind_of, untouched
+from testbed.benchmarks.failures import failures
 from testbed.benchmarks.published_sets import PARTS, unpack
 from testbed.withheld.files import read_json
 from testbed.withheld.refly import FLOWN_AGAIN
@@ -40,6 +41,7 @@ def pooled(places: Sequence[Path]) -> dict[str, Any]:
                     if path.stem != "seed":
                         (Path(name) / part / path.name).symlink_to(path.resolve())
         found = score(*(Path(name) / part for part in PARTS))
+        found["failures"] = failures(Path(name) / "answers", Path(name) / "keys")
     return found | sets[0]
 
 

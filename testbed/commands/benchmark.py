@@ -71,6 +71,9 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
     if name == "adaptation":
         _adaptation(quick, as_json)
         return
+    if (pool or jsbsim or jsbsim_root) and (publish or ledger):
+        option, beside = "--publish" if publish else "--ledger", "--pool" if pool else "--jsbsim"
+        raise InputError(f"{option}: of a set that is drawn and solved; leave it out with {beside}")
     if name == "diagnosis" and (jsbsim or jsbsim_root):
         _jsbsim(cases, seed, out / "jsbsim", workers, jsbsim_root, as_json)
         return

@@ -1,0 +1,61 @@
+"""What a solver failed at in a scored set: case by case, worst first, so that a reader sees more than shares."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from testbed.withheld.files import read_json
+from testbed.withheld.score import Case, flat
+
+# Which single effects and pairs could have been told is in the keys; those that could not are no failures but of pairs.
+TIERS = ("single", "pair", "unknown", "null", "faults")
+HEADERS = {"tier": "left", "sigma_w, m/s": "right", "D": "right", "can be told": "left", "truth": "left",
+           "answer": "left"}  # fmt: skip
+
+
+def failures(answers: Path, keys: Path) -> list[dict[str, Any]]:
+    """Every case that was answered wrongly, by tier, the farthest from what it was taken for first.
+
+    Returns:
+        case, tier, sigma_w (m/s), D (to none; of unknown effects to the nearest pair), can_be_told (singles and pairs),
+        truth and answer in words.
+    """
+    found = []
+    for path in sorted(answers.glob("*.json")):
+        answer, key = read_json(path), read_json(keys / path.name)
+        case = flat(answer, key)
+        if _wrong(case):
+            near = key["D_pair"] if key["tier"] == "unknown" else key["D_none"]
+            found.append({"case": path.stem, "tier": key["tier"], "sigma_w": key["sigma_w"], "D": near,
+                          "can_be_told": case["identifiable"] if key["tier"] in ("single", "pair") else None,
+                          "truth": _truth(key), "answer": _told(answer)})  # fmt: skip
+    return sorted(found, key=lambda one: (TIERS.index(one["tier"]), not one["can_be_told"], -(one["D"] or 0.0)))
+
+
+def rows(found: list[dict[str, Any]]) -> list[list[str]]:
+    """Of a table with HEADERS."""
+    said = {True: "yes", False: "no", None: ""}
+    return [[one["tier"], f"{one['sigma_w']:g}", "-" if one["D"] is None else f"{one['D']:.0f}",
+             said[one["can_be_told"]], one["truth"], one["answer"]] for one in found]  # fmt: skip
+
+
+def _wrong(case: Case) -> bool:
+    """As the scorer's tiers count it; of single effects those that could have been told alone."""
+    right = {"single": case["top1"] or not case["identifiable"], "null": not case["alarm"],
+             "faults": case.get("caught", True)}  # fmt: skip
+    return not right.get(case["tier"], case["exact"])
+
+
+def _truth(key: dict[str, Any]) -> str:
+    fault, effects = key.get("fault"), [f"{n} ({form})" for n, form in zip(key["effects"], key["forms"], strict=True)]
+    said = " + ".join(effects) or "no gap"
+    return f"{fault['kind']} {fault['channel']}, {said}" if fault else said
+
+
+def _told(answer: dict[str, Any]) -> str:
+    if "error" in answer:
+        return f"refused: {answer['error']}"
+    first = max(answer["hypotheses"], key=lambda h: h["probability"])
+    names = [*first["effects"], *(["something unknown"] if first["unknown"] else [])]
+    return f"{' + '.join(names) or 'no gap'}, {first['probability']:.2f}"
