@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from testbed.withheld.files import read_json
-from testbed.withheld.score import Case, flat
+from testbed.withheld.score import RIGHT, Case, flat
 
-# Which single effects and pairs could have been told is in the keys; those that could not are no failures but of pairs.
 TIERS = ("single", "pair", "unknown", "null", "faults")
 HEADERS = {"tier": "left", "sigma_w, m/s": "right", "D": "right", "can be told": "left", "truth": "left",
            "answer": "left"}  # fmt: skip
@@ -42,9 +41,8 @@ def rows(found: list[dict[str, Any]]) -> list[list[str]]:
 
 def _wrong(case: Case) -> bool:
     """As the scorer's tiers count it; of single effects those that could have been told alone."""
-    right = {"single": case["top1"] or not case["identifiable"], "null": not case["alarm"],
-             "faults": case.get("caught", True)}  # fmt: skip
-    return not right.get(case["tier"], case["exact"])
+    able = case["identifiable"] or case["tier"] != "single"
+    return bool(able and not case[(RIGHT | {"faults": "caught"})[case["tier"]]])
 
 
 def _truth(key: dict[str, Any]) -> str:

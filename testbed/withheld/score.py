@@ -26,6 +26,7 @@ HARMLESS = ("slow", "between", "engines", "powerless")  # what formats allow
 CLOSURES = {"published": ("before", "spread", "own_oracle", "after"),
             "effects_alone": ("before", "spread", "oracle", "effects_after"),
             "own": ("own_before", "noise", "own_oracle", "own_after")}  # fmt: skip
+RIGHT = {"null": "silent", "single": "top1", "pair": "exact", "unknown": "exact"}  # what counts, by tier
 Case = dict[str, Any]
 
 
@@ -256,9 +257,8 @@ def _shares(cases: Sequence[Case], right: str, *others: str) -> dict[str, Any]:
 def by_tier(cases: Sequence[Case], without: Sequence[Case]) -> dict[str, Any]:
     """Each tier by itself, with every effect's recall; `without`: right where unknown or a rival within D of SAME."""
     of = {tier: [c for c in cases if c["tier"] == tier] for tier in ("null", "single", "pair", "unknown", "faults")}
-    rules = {"null": "silent", "single": "top1", "pair": "exact", "unknown": "exact"}
     tiers = {tier: _shares(of[tier], rule) | {"detectable": sum(c["none"] >= DETECTABLE for c in of[tier])}
-             for tier, rule in rules.items()}  # fmt: skip
+             for tier, rule in RIGHT.items()}  # fmt: skip
     clear = [c for c in cases if c["identifiable"] and c["tier"] == "single"]
     names = sorted({c["effects"][0] for c in clear})
     tiers["single"]["recall"] = {n: share([c["top1"] for c in clear if c["effects"] == (n,)]) for n in names}
