@@ -1,5 +1,6 @@
 """A surface that answers whole and late is no lag, and a lag, of whatever order, is not merely late."""
 
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -16,6 +17,7 @@ from sim2real.posterior.any_delay import late_fits
 from sim2real.posterior.form import FORGIVEN
 from sim2real.records.channels import SURFACES
 from sim2real.records.reconstruct import reconstruct
+from testbed.commands.diagnose import answer, show
 from testbed.flight import fly
 
 NATURAL = 8.0  # rad/s of an actuator of second order
@@ -90,7 +92,7 @@ def test_what_is_late_where_something_known_enters_is_its_affair():
     assert late_fits(found, 0.0, 1.0, {"elevator_path"}) == []
 
 
-def test_an_elevator_that_answers_late_is_told_as_that_and_not_as_a_lag():
+def test_an_elevator_that_answers_late_is_told_as_that_and_not_as_a_lag(capsys):
     found = diagnose([asked_early(seed, "elevator", 7) for seed in (4, 5, 6)])
     assert found.verdict == "unknown"
     assert found.unknown is not None
@@ -98,3 +100,5 @@ def test_an_elevator_that_answers_late_is_told_as_that_and_not_as_a_lag():
     (term,) = found.unknown["terms"]
     assert term["term"] == "delay"
     assert term["coefficient"] == pytest.approx(0.14, abs=0.005)
+    show(found, answer(found))
+    assert re.search(r"terms of elevator_path \(dynamic\).*\ndelay +0\.1[34]\d* ", capsys.readouterr().out, re.DOTALL)

@@ -141,6 +141,8 @@ def show(found: Diagnosis, result: dict[str, Any]) -> None:
         click.echo()
         print_table("Effects of the first explanation", {"effect": "left"} | dict(list(headers.items())[2:]),
                     [[name, *_parameter(described[name])] for name in first])
+    if found.verdict == "unknown" and result["unknown"] and "places" not in result["unknown"]:  # else the verdict tells
+        show_unknown(result["unknown"])
     click.echo()
     channels = result["where"]["channels"]
     print_table("Gap by channel, tolerances of 14 CFR Part 60", {"channel": "left", "before": "right"},
@@ -154,6 +156,14 @@ def show(found: Diagnosis, result: dict[str, Any]) -> None:
         click.echo(told)
     for problem in result["data_problems"]:
         click.echo(f"Record: {problem['channel']} {problem['kind']}")
+
+
+def show_unknown(unknown: dict[str, Any]) -> None:
+    """The terms that what the library lacks is described by, as the report has them."""
+    click.echo()
+    print_table(f"What the library lacks: terms of {unknown['component']} ({unknown['kind']})",
+                {"term": "left", "coefficient": "right", "standard error": "right"},
+                [[t["term"], f"{t['coefficient']:.4g}", f"{t['std_error']:.2g}"] for t in unknown["terms"]])
 
 
 def show_ladder(ladder: dict[str, Any]) -> None:
