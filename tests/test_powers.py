@@ -10,6 +10,7 @@ from icing_env import aircraft, scenario
 from icing_env.record import FlightRecord
 from sim2real.diagnosis import diagnose
 from sim2real.library.candidates import bank, not_testable
+from sim2real.library.terms import pushes
 from sim2real.records.channels import MEASURED
 from sim2real.records.powers import powers
 from sim2real.records.reconstruct import reconstruct
@@ -69,3 +70,12 @@ def test_what_the_axial_acceleration_stands_for_is_compared_and_tested_no_more()
 @pytest.mark.parametrize("absent", [ENGINES, (*ENGINES, "throttle")])
 def test_a_clean_aircraft_without_engine_channels_is_not_blamed(absent):
     assert diagnose([without(flown(0.5), *absent)]).verdict == "no_gap"
+
+
+@pytest.mark.parametrize("absent", [ENGINES, (*ENGINES, "throttle")])
+def test_a_thrust_coefficient_made_of_what_it_would_explain_says_nothing(absent):
+    """Levers tell of power by themselves; without them it is made of alpha and ax, and no discrepancy goes with it."""
+    flight = reconstruct(without(flown(), *absent))
+    (term,) = [t for t in bank().terms if (t.component, t.name) == ("sensor:alpha", "CT")]
+    (push,) = pushes(flight, [term])
+    assert np.any(push.series != 0.0) == (flight.power_from == "throttle")
