@@ -19,6 +19,8 @@ from sim2real.records.channels import SURFACES
 from sim2real.records.reconstruct import reconstruct
 from testbed.commands.diagnose import answer, show
 from testbed.flight import fly
+from testbed.reports.surface_answers import answer as drawn
+from testbed.reports.surface_answers import by_surface, suspected
 
 NATURAL = 8.0  # rad/s of an actuator of second order
 
@@ -102,4 +104,12 @@ def test_an_elevator_that_answers_late_is_told_as_that_and_not_as_a_lag(capsys):
     assert term["term"] == "delay"
     assert term["coefficient"] == pytest.approx(0.14, abs=0.005)
     show(found, answer(found))
+    before, after = map(float, by_surface(found, answer(found))[0][1:])
+    assert after < 0.1 * before
+    assert suspected(answer(found)) == ["elevator"]
+    figure = drawn(found, answer(found), "elevator")
+    assert figure is not None
+    lines = {line.get_label(): line.get_xydata() for line in figure.axes[0].get_lines()}
+    np.testing.assert_allclose(lines["record"], lines["after"], atol=0.15)  # deg
+    assert np.max(np.abs(lines["record"] - lines["before"])) > 1.0
     assert re.search(r"terms of elevator_path \(dynamic\).*\ndelay +0\.1[34]\d* ", capsys.readouterr().out, re.DOTALL)

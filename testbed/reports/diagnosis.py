@@ -22,6 +22,7 @@ from testbed.reports.diagnosis_figures import bars, heat, ladder_gaps, regime_he
 from testbed.reports.page import Report
 from testbed.reports.plot_style import scale_of
 from testbed.reports.plotting import gap_bars, time_histories
+from testbed.reports.surface_answers import answer, by_surface, suspected
 
 KIND = {"no_gap": "good", "explained": "caution", "unknown": "bad"}
 OVERLAID = ("airspeed", "alpha", "q", "theta", "ax", "az", "beta", "p", "r", "phi", "ay")
@@ -96,7 +97,7 @@ def _terms(report: Report, described: Mapping[str, Any], what: str) -> None:
     at = f"terms of {described['component']}" if "places" not in described else "changes of the model's numbers"
     report.table(["term", "coefficient", "standard error"],
                  [[t["term"], t["coefficient"], t["std_error"]] for t in described["terms"]],
-                 f"{what}, as {at} ({described['kind']}).")
+                 f"{what}, as {at} ({described['kind']}); coefficients in SI units, angles in rad, delays in s.")
 
 
 def _listed(names: list[str]) -> str | None:
@@ -114,6 +115,7 @@ def _where(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:
     if result["where"]["components"]:
         report.table(["component", "probability that the gap enters there"],
                      [[c, f"{p:.3f}"] for c, p in result["where"]["components"].items()], "Where the gap enters.")
+    _paths(report, found, result)
     report.figure(heat(training, [len(cut(f).first) for f in found.details.flights]),
                   "Residual by channel and window, in tolerances, before the diagnosis.")
     if flown := stretches(found.details.evidences):
@@ -126,6 +128,17 @@ def _where(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:
                      [[scale_of(r["variable"]).label, r["low"], r["high"], r["excess"], ", ".join(r["channels"]) or "-"]
                       for r in result["where"]["regimes"][:10]],
                      "Regimes in which one-step predictions err by more than noise and gusts (mean square less one).")
+
+
+def _paths(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:
+    """Surfaces behind their commands, which no flight residual shows: it starts from the surfaces as recorded."""
+    if rows := by_surface(found, result):
+        report.table(["path", "before (deg)", "after (deg)"], rows,
+                     "Surfaces behind their commands: RMS of recorded less predicted position.")
+    for surface in suspected(result):
+        if (figure := answer(found, result, surface)) is not None:
+            report.figure(figure, f"The {surface} as its command moves it, where that moves most: as recorded, behind "
+                          "the model's actuator, and behind the one diagnosed.")
 
 
 def _closing(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:
