@@ -20,6 +20,7 @@ DEAD = (*MOTION, "psi")  # set aside where constant
 STILL = ("airspeed", "elevator", "aileron", "rudder", "thrust_left", "thrust_right", "altitude", "ground_speed",
          "track")  # kept where constant, and told  # fmt: skip
 FEWEST = 20  # samples
+REGULAR = 0.95  # share of a channel's changes that come as regularly as samples: those between are repeats
 FROZEN = 1.0  # s without any change in a channel that otherwise changes
 LONGER = 5.0  # times any other stretch without change
 HELD, REPEATS = ("elevator", "aileron", "rudder"), 2  # may stand still, unless noise always moves them
@@ -31,8 +32,8 @@ SPIKE_FLOOR = {**dict.fromkeys(("alpha", "beta", "phi", "theta", "psi"), 0.006),
 
 
 def mended(record: FlightRecord) -> FlightRecord:
-    """The record without dead channels, spikes and frozen stretches; each is among its `problems`."""
-    return _without_frozen(_without_spikes(_without_constants(record)))
+    """The record without dead channels, repeats, spikes and frozen stretches; each is among its `problems`."""
+    return _without_frozen(_without_spikes(_without_repeats(_without_constants(record))))
 
 
 def _replace(record: FlightRecord, name: str, values: FloatArray) -> FlightRecord:
@@ -48,6 +49,28 @@ def _without_constants(record: FlightRecord) -> FlightRecord:
     found = [DataProblem(n, f"constant at {np.nanmax(record[n]):g}, {done[n]}", start, end, n in DEAD) for n in still]
     known = set(record.problems)
     return replace(record, channels=kept).with_problems(p for p in found if p not in known)
+
+
+def _without_repeats(record: FlightRecord) -> FlightRecord:
+    """Blank what a slower channel repeats until its next sample: a reading held is none, and old.
+
+    Of what the equations of motion need at the record's rate; thrust and altitude may as well be held.
+    """
+    for name in (*MOTION, "airspeed", *HELD):
+        if not record.has(name):
+            continue
+        rows = np.flatnonzero(np.isfinite(record[name]))
+        new = np.concatenate(([True], np.diff(record[name][rows]) != 0.0))
+        apart = np.diff(np.flatnonzero(new))
+        usual = int(np.median(apart)) if len(apart) >= FEWEST else 1
+        if usual < 2 or np.mean((apart == usual) | (apart == usual + 1)) < REGULAR:
+            continue
+        cleaned = record[name].copy()
+        cleaned[rows[~new]] = np.nan
+        span = float(record.time[rows[0]]), float(record.time[rows[-1]])
+        kind = f"repeats every sample {np.mean(apart):.2g} times, repeats left out"
+        record = _replace(record, name, cleaned).with_problems([DataProblem(name, kind, *span, True)])
+    return record
 
 
 def _without_spikes(record: FlightRecord) -> FlightRecord:
