@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from sim2real.diagnosis import Diagnosis
+from sim2real.library.terms import PURE_DELAY
 
 
 def sentences(found: Diagnosis) -> list[str]:
@@ -38,12 +39,18 @@ def _finding(found: Diagnosis) -> str:
     if found.unknown and "places" in found.unknown and first["unknown"]:
         return _another_aircraft(found.unknown, named, sure)
     if found.verdict == "unknown" and not first["effects"]:
-        where = found.unknown["component"] if found.unknown else "nowhere in particular"
+        where = found.unknown["component"] + _late(found.unknown) if found.unknown else "nowhere in particular"
         return f"There is a gap that nothing in the library explains; it enters at {where} ({sure})."
     if not first["effects"]:
         return "There is a gap, but no single explanation stands out."
     beside = ["something that the library lacks"] if first["unknown"] else []
     return f"The gap is best explained by {' and '.join(named + beside)} ({sure})."
+
+
+def _late(unknown: dict[str, Any]) -> str:
+    """By how much a path answers late, if that is all."""
+    delays = [t["coefficient"] for t in unknown["terms"] if t["term"] == PURE_DELAY]
+    return "".join(f", which answers {delay:.2g} s late" for delay in delays)
 
 
 def _another_aircraft(unknown: dict[str, Any], named: list[str], sure: str) -> str:
@@ -52,8 +59,9 @@ def _another_aircraft(unknown: dict[str, Any], named: list[str], sure: str) -> s
     where = ", ".join(f"{c} {rms:.1f}" for c, rms in places)
     others = ", ".join(t["term"] for t in unknown["terms"][:6])
     also = [f"numbers that no effect of the library changes ({others})"] * bool(others)
+    has = f"; it has {', '.join(named + also)}" if named or also else ""
     return (f"The aircraft differs from the model in many numbers at once ({sure}), in tolerances: "
-            f"{where or 'less than one anywhere'}; it has {', '.join(named + also)}.")
+            f"{where or 'less than one anywhere'}{has}.")
 
 
 def _named(effect: dict[str, Any]) -> str:

@@ -17,6 +17,7 @@ from sim2real.posterior.any_delay import late_fits
 from sim2real.posterior.form import FORGIVEN
 from sim2real.records.channels import SURFACES
 from sim2real.records.reconstruct import reconstruct
+from sim2real.words import sentences
 from testbed.commands.diagnose import answer, show
 from testbed.flight import fly
 from testbed.reports.surface_answers import answer as drawn
@@ -103,6 +104,7 @@ def test_an_elevator_that_answers_late_is_told_as_that_and_not_as_a_lag(capsys):
     (term,) = found.unknown["terms"]
     assert term["term"] == "delay"
     assert term["coefficient"] == pytest.approx(0.14, abs=0.005)
+    assert "it enters at elevator_path, which answers 0.14 s late (" in sentences(found)[0]
     show(found, answer(found))
     before, after = map(float, by_surface(found, answer(found))[0][1:])
     assert after < 0.1 * before
