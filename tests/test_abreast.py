@@ -12,7 +12,7 @@ from sim2real.prediction.abreast import Abreast
 from sim2real.prediction.kalman import Gain, follow, gains
 from sim2real.prediction.predictor import Push, innovations
 from sim2real.records.reconstruct import Reconstruction, reconstruct
-from sim2real.signatures.evidence import SIGMAS, choose_gain
+from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
 from testbed.flight import fly
 
 

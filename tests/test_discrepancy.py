@@ -20,9 +20,8 @@ from sim2real.diagnosis import diagnose
 from sim2real.library.candidates import bank
 from sim2real.library.terms import GENERIC, pushes
 from sim2real.prediction.kalman import gains
-from sim2real.prediction.predictor import innovations
+from sim2real.prediction.predictor import innovations, predicted
 from sim2real.records.reconstruct import reconstruct
-from sim2real.signatures.evidence import predicted
 from testbed.flight import fly
 
 AIRCRAFT = changed(load(), Cm_elevator_CT=0.0)  # power would change what a term of the elevator does

@@ -17,8 +17,9 @@ from sim2real.library.candidates import bank
 from sim2real.posterior.generic import fit_unknown
 from sim2real.records.channels import MEASURED
 from sim2real.records.reconstruct import Inadequacy
-from sim2real.signatures.evidence import SETTLE, gather
+from sim2real.signatures.evidence import gather
 from sim2real.signatures.means import without_means
+from sim2real.signatures.whitening import SETTLE
 from sim2real.words import of_the_model
 from testbed.withheld.draw import published_spread
 from testbed.withheld.files import record_text, side_text

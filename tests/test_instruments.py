@@ -66,13 +66,24 @@ def test_pitch_and_roll_have_one_recorder(lags, found, monkeypatch) -> None:
 
 
 def test_wrong_attitudes_do_not_change_the_recorder() -> None:
-    """A delay far beyond a low pass is somebody else's (`data_checks` names it), and slow attitudes tell nothing."""
+    """A delay far beyond a low pass is somebody else's (`data_checks` names it)."""
     record = flown()
     late = replace(record, channels={**record.channels, "phi": np.roll(record["phi"], 10),
                                      "theta": np.roll(record["theta"], 10)})
     assert with_recorder([late]) == [late]
-    slow = np.where(np.arange(len(record)) % 5 == 0, record["phi"], np.nan)
-    assert recorder_lags([replace(record, channels={**record.channels, "phi": slow})]) is None
+
+
+def test_slow_attitudes_tell_of_the_recorder_at_their_samples_alone() -> None:
+    """Held until the next sample they are late by two steps: a record was taken to have no low pass at all."""
+    every, slow = [flown(seed=seed) for seed in (1, 2, 3)], list[FlightRecord]()
+    for k, record in enumerate(every):
+        since = np.arange(len(record)) // 5 * 5
+        held = {n: record[n][since] if k else np.where(np.arange(len(record)) % 5 == 0, record[n], np.nan)
+                for n in ("phi", "theta")}  # fmt: skip
+        slow.append(replace(record, channels={**record.channels, **held}))
+    for (lag, _), (own, error) in zip(recorder_lags(every), recorder_lags(slow), strict=True):
+        assert abs(own - lag) < 4.0 * error < 0.008
+    assert with_recorder(slow) == slow
 
 
 def test_declared_instruments_are_the_models() -> None:

@@ -19,7 +19,7 @@ from sim2real.flown.settling import likeliest, settle
 from sim2real.library.candidates import bank
 from sim2real.prediction.kalman import gains
 from sim2real.records.reconstruct import Reconstruction
-from sim2real.signatures.evidence import SIGMAS, choose_gain, likelihoods
+from sim2real.signatures.gust_intensity import SIGMAS, choose_gain, likelihoods
 from testbed.withheld.draw import SPREAD, published_spread
 from testbed.withheld.files import record_text, side_text
 from testbed.withheld.flights import Aircraft, recorded

@@ -25,6 +25,7 @@ from sim2real.records.channels import SURFACES
 from sim2real.records.instruments import UNFILTERED
 from sim2real.records.noise import white
 from sim2real.records.reconstruct import Reconstruction
+from sim2real.records.rounding import SEVERAL, rounding
 
 POSITION_NOISE = 5.2e-4  # rad, the least believed (0.03 deg)
 AROUND = 5  # samples about one, where a command of doubtful timing moves
@@ -110,7 +111,8 @@ def position_noise(flight: Reconstruction, surface: str) -> tuple[FloatArray, Fl
 def _position_noise(flight: Reconstruction, surface: str) -> tuple[FloatArray, FloatArray]:
     measured, good = flight.positions[surface], np.isfinite(flight.positions[surface])
     rate = np.gradient(np.interp(flight.time, flight.time[good], measured[good]), flight.dt)
-    noise = np.hypot(max(POSITION_NOISE, white(measured)), flight.timing * maximum_filter1d(np.abs(rate), AROUND))
+    least = max(POSITION_NOISE, white(measured), rounding(measured, SEVERAL))
+    noise = np.hypot(least, flight.timing * maximum_filter1d(np.abs(rate), AROUND))
     return rate, noise * _weight(flight)
 
 

@@ -17,12 +17,13 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import chi2
 
 from icing_env.record import FloatArray
-from sim2real.actuators.paths import follow
+from sim2real.actuators.paths import POSITION_NOISE, follow
 from sim2real.actuators.timing import LAGS
 from sim2real.records.channels import SURFACES
 from sim2real.records.instruments import UNFILTERED
 from sim2real.records.noise import white
 from sim2real.records.reconstruct import Reconstruction
+from sim2real.records.rounding import SEVERAL, rounding
 
 PLACED = 3e-5  # rad, what a fitted law leaves (assumed: a position's noise over the root of the samples behind a term)
 EXACT = 3e-6  # rad, the same of a law of which nothing but the lag is fitted (assumed)
@@ -58,6 +59,8 @@ def _law(flight: Reconstruction, command: FloatArray, surface: str) -> tuple[Flo
     """
     good, published = np.isfinite(flight.positions[surface]), float(flight.parameters[f"{surface}_lag"][0])
     recorded, n = flight.positions[surface][good], int(np.count_nonzero(good))
+    least = rounding(recorded, SEVERAL)
+    known = max(1.0, least / POSITION_NOISE)  # times which what is left by a law is as large
 
     def behind(lag: float, filtered: bool = True) -> FloatArray:
         return _basis(_behind(flight, command, surface, lag, filtered))
@@ -77,16 +80,16 @@ def _law(flight: Reconstruction, command: FloatArray, surface: str) -> tuple[Flo
     def square(lag: float, terms: int) -> float:
         return float(np.sum(left(lag, terms) ** 2))
 
-    if _published(left(published, 0), behind(published)[good]):
-        return behind(published, filtered=False)[:, 0], EXACT
+    if _published(left(published, 0), behind(published)[good], least):
+        return behind(published, filtered=False)[:, 0], EXACT * known
     every = behind(published).shape[1]
     laws = [(published, 0, 0), *((_lag(square, terms, published), terms, terms + 1) for terms in (0, 2, every))]
-    noise = max(white(left(laws[-1][0], every)), 1e-9)
-    fitting = [law for law in laws if _nothing_else(left(*law[:2]))]
+    noise = max(white(left(laws[-1][0], every)), least, 1e-9)
+    fitting = [law for law in laws if _nothing_else(left(*law[:2]), least)]
     if not fitting:
         return None
     lag, terms, _ = min(fitting, key=lambda law: square(*law[:2]) / noise**2 + law[2] * np.log(n))
-    return np.asarray(behind(lag, filtered=False) @ weights(lag, terms)), PLACED if terms else EXACT
+    return np.asarray(behind(lag, filtered=False) @ weights(lag, terms)), (PLACED if terms else EXACT) * known
 
 
 def _behind(flight: Reconstruction, command: FloatArray, surface: str, lag: float, filtered: bool) -> FloatArray:
@@ -98,18 +101,18 @@ def _behind(flight: Reconstruction, command: FloatArray, surface: str, lag: floa
     return follow(command, command[0], row, surface, flight.dt)[:, 0]
 
 
-def _published(left: FloatArray, basis: FloatArray) -> bool:
+def _published(left: FloatArray, basis: FloatArray, least: float) -> bool:
     """Whether nothing need be fitted: what the published actuator leaves is white, and no other law says it better.
 
     Another lag is to first order an advance.
     """
-    square, cost = max(white(left), 1e-9) ** 2, np.log(len(left))
+    square, cost = max(white(left), least, 1e-9) ** 2, np.log(len(left))
 
     def gain(columns: FloatArray) -> float:
         fitted = columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
         return float(fitted @ fitted) / square
 
-    return _nothing_else(left) and gain(basis[:, RATE : RATE + 1]) < cost and gain(basis) < 3.0 * cost
+    return _nothing_else(left, least) and gain(basis[:, RATE : RATE + 1]) < cost and gain(basis) < 3.0 * cost
 
 
 def _lag(square: Callable[[float, int], float], terms: int, published: float) -> float:
@@ -128,9 +131,9 @@ def _basis(position: FloatArray) -> FloatArray:
     return np.column_stack([position, slow[:, 0], position**3, rate, np.gradient(rate), slow[:, 1:]])
 
 
-def _nothing_else(left: NDArray) -> bool:
-    """Whether means over SCALES of samples are as small as the means of white noise."""
-    square = max(white(left), 1e-9) ** 2
+def _nothing_else(left: NDArray, least: float) -> bool:
+    """Whether means over SCALES of samples are as small as the means of white noise, of `least` or more."""
+    square = max(white(left), least, 1e-9) ** 2
     for m in SCALES:
         if (count := len(left) // m) == 0:
             continue  # a short record

@@ -19,7 +19,8 @@ from sim2real.posterior.generic import fit_unknown
 from sim2real.prediction.kalman import Gain, gains
 from sim2real.records.channels import MEASURED
 from sim2real.records.reconstruct import Reconstruction
-from sim2real.signatures.evidence import SIGMAS, Evidence, gather, likelihoods
+from sim2real.signatures.evidence import Evidence, gather
+from sim2real.signatures.gust_intensity import SIGMAS, likelihoods
 from sim2real.signatures.tempering import total
 
 BATCHES = (100, 30, 10, 4)  # into which a flight is cut

@@ -23,7 +23,8 @@ from sim2real.posterior.singles import EffectFit, fit_family
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.records.side_by_side import each
 from sim2real.signatures.courses import Course, in_time
-from sim2real.signatures.evidence import SETTLE, Evidence, compare
+from sim2real.signatures.evidence import Evidence, compare
+from sim2real.signatures.whitening import SETTLE
 
 LEADING, LIKELY = 2, 0.02  # explanations that are flown again, and how probable they have to be
 CERTAIN = 0.05  # probability of no gap above which nothing is: sizes near zero have no likelihood of Gaussian shape

@@ -39,7 +39,8 @@ from sim2real.prediction.predictor import Push
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.records.side_by_side import each
 from sim2real.signatures.courses import Courses, Remainder
-from sim2real.signatures.evidence import SETTLE, Evidence, to_fly, told
+from sim2real.signatures.evidence import Evidence, to_fly, told
+from sim2real.signatures.whitening import SETTLE
 
 SIDE_BY_SIDE = 6  # steps with the same slopes where many sets take them together
 HOPELESS = 100.0  # log likelihood from the best, and half of what that explains, beyond which nothing is tried further

@@ -17,11 +17,14 @@ from sim2real.library.terms import pushes
 from sim2real.posterior.attribution import nuisance_mean, reduce, with_prior
 from sim2real.posterior.hypotheses import Hypothesis
 from sim2real.prediction.kalman import Gain, follow, gains
-from sim2real.prediction.predictor import Push, innovations, predicted
+from sim2real.prediction.predictor import Push, as_predicted, innovations
+from sim2real.prediction.readings import apart
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.records.side_by_side import each
-from sim2real.signatures.evidence import SIGMAS, Evidence, choose_gain, gather, whitening
+from sim2real.signatures.evidence import Evidence, gather
+from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
 from sim2real.signatures.tempering import temper, total
+from sim2real.signatures.whitening import whitening
 
 SETTLING, SETTLED = 6, 10.0  # steps towards the best nuisances, and the whitened length of a step that ends them
 NEAR = 2  # of SIGMAS to either side are tried
@@ -40,7 +43,7 @@ def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseli
     """
     only = replace(candidates, families=(), terms=(), size=1 + len(candidates.nuisances))
     centre = np.zeros(len(candidates.nuisances))
-    known = [choose_gain(f, gains(f, SIGMAS)).with_start() for f in flights]
+    known = [_at_first(f) for f in flights]
     for k in range(SETTLING):
         evidences = gather_about(flights, only, centre, known)
         gram = with_prior(total(evidences), only, baseline.precision, centre)
@@ -52,6 +55,12 @@ def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseli
             break
         known = each(likeliest, about(flights, only, centre), known)
     return centre, known
+
+
+def _at_first(flight: Reconstruction) -> Gain:
+    """The gain of the record's likeliest gusts, along it where a channel is slow."""
+    found = choose_gain(flight, gains(flight, SIGMAS))
+    return follow(flight, found) if max(apart(flight)) > 1 else found.with_start()
 
 
 def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline
@@ -158,9 +167,10 @@ def _pushed(evidence: Evidence, flight: Reconstruction, candidates: Bank, weight
     terms = [term for term in candidates.terms if term.row in weights]
     if not terms:
         return []
-    left = innovations(flight, flight.parameters, evidence.gain.K)[:, 0]
+    gain = evidence.gain
+    left = innovations(flight, flight.parameters, gain.K)[:, 0]
     return [replace(push, series=weights[push.row] * push.series)
-            for push in pushes(replace(flight, measured=predicted(flight, left)), terms)]
+            for push in pushes(as_predicted(flight, left, gain.K, gain.S.ndim == 3), terms)]
 
 
 def unlike(one: Gain, other: Gain) -> float:

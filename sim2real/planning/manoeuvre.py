@@ -20,7 +20,7 @@ from sim2real.prediction.kalman import gains
 from sim2real.prediction.predictor import Predictor, innovations, put
 from sim2real.records.channels import FED_BACK, MEASURED, NOISE_FLOOR
 from sim2real.records.reconstruct import Reconstruction
-from sim2real.signatures.evidence import SETTLE, whiten
+from sim2real.signatures.whitening import SETTLE, whiten
 
 DURATION = 30.0  # s
 TARGET = 5.0  # distance beyond which more is worth nothing (bounded Hunter-Reiner criterion)

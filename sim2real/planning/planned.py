@@ -185,7 +185,7 @@ def _apparent(made: Reconstruction, sigma: float) -> FloatArray:
     C = C[:FED_BACK]
     columns = [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
     Qw = gust_noise(sigma, float(np.median(made.channel("airspeed"))), float(np.median(made.altitude)), made.dt)
-    added = roughness(A, C, A[:, columns], C[:, columns], Qw)
+    added = roughness(A, C, A[:, columns], C[:, columns], Qw, [1] * len(C))
     out = made.noise.copy()
     out[:FED_BACK] = np.sqrt(out[:FED_BACK] ** 2 + added)
     return out

@@ -12,13 +12,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from estimators.signals.resample import gaps
 from icing_env.jit import entry
 from icing_env.record import FloatArray
 from icing_env.turbulence import pair_noise, scales
-from sim2real.prediction.predictor import TANGENT, Predictor
+from sim2real.prediction.predictor import TANGENT, Predictor, stretch
+from sim2real.prediction.readings import ALTITUDE, apart, read_share, unread
 from sim2real.records.channels import FED_BACK, MEASURED, NOISE_FLOOR, SURFACES
 from sim2real.records.reconstruct import Reconstruction
 
@@ -33,7 +32,7 @@ TRANSIENT = 10.0  # s with gains of their own after the start
 SPAN = 1.0  # s along a record that are flown as if at one condition
 ROUGH = 60  # steps after which a gust no longer shows in third differences
 DOUBLINGS = 16  # 65536 steps
-GAP = 0.3  # s that a channel that is absent, and not slow, has not been read (assumed)
+SURE = 0.25  # share of a slow channel's variance in third differences that counts as its noise at the least (assumed)
 ABSENT = 1e6  # variance of a reading that is not there
 
 
@@ -98,9 +97,16 @@ def gains(flight: Reconstruction, sigmas: tuple[float, ...]) -> list[Gain]:
     C, out = C[:FED_BACK], list[Gain]()
     for sigma in sigmas:
         Qw, columns = _gusts(flight, sigma)
-        rough = roughness(A, C, A[:, columns], C[:, columns], Qw)
-        model = _noisy(flight, A, C, B, sigma, Qw, flight.noise[:FED_BACK] ** 2 - rough)
+        rough = roughness(A, C, A[:, columns], C[:, columns], Qw, apart(flight))
+        # far apart, samples differ by gusts most of all: what is left of that says little, and too much harms less
+        seen = flight.noise[:FED_BACK] ** 2
+        noise = np.maximum(seen - rough, np.where(np.array(apart(flight)) > 1, SURE * seen, 0.0))
+        model = _noisy(flight, A, C, B, sigma, Qw, noise, read_share(flight))
         steady, S = _steady(*model)
+        for c, m in enumerate(apart(flight)):
+            if m > 1:  # so many steps' corrections at once are less than as many times one
+                one = min(float(C[c] @ steady[:, c]), 1.0)
+                steady[:, c] *= (1.0 - (1.0 - one) ** m) / (one * m)
         out.append(Gain(sigma, steady[None], S, model, round(TRANSIENT / flight.dt)))
     return out
 
@@ -115,38 +121,21 @@ def follow(flight: Reconstruction, gain: Gain) -> Gain:
     steps, each = len(flight.time) - 1, max(round(SPAN / flight.dt), 1)
     spans = [slice(k, min(k + each, steps + 1)) for k in range(0, steps, each)]
     P, (Qw, columns) = _start_covariance(gain.sigma), _gusts(flight, gain.sigma)
-    lost = absent(flight)[1:].astype(float)
+    lost = unread(flight)[1:].astype(float)
     D = gain.model[1][:, columns]
-    noise = np.diag(gain.model[3] - D @ Qw @ D.T) * np.maximum(read_share(flight), 1e-3)
+    share, steadily = read_share(flight), np.arange(FED_BACK) == ALTITUDE
+    noise = np.diag(gain.model[3] - D @ Qw @ D.T) * np.maximum(share, 1e-3)
+    share = np.where(steadily, share, share > 0.0)
     K, S = [], []
-    for span, A, C, B in zip(spans, *linearise(flight, spans), strict=True):
-        model = _noisy(flight, A, C[:FED_BACK], B, gain.sigma, Qw, noise)
+    linear = flight.once("linear along", lambda: linearise(flight, spans))
+    for span, A, C, B in zip(spans, *linear, strict=True):
+        model = _noisy(flight, A, C[:FED_BACK], B, gain.sigma, Qw, noise, share)
         here, covariance, P = _recursion(*model, P, lost[span.start : span.start + each])
         K.append(np.swapaxes(here, 1, 2))
         S.append(covariance)
     by_channel = np.ascontiguousarray(np.concatenate(K))  # in memory as the loop of the predictor reads them
+    by_channel /= np.where(steadily, 1.0, stretch(flight))[:, None]  # their gains are those of readings as it is
     return replace(gain, K=np.swapaxes(by_channel, 1, 2), S=np.concatenate(S))
-
-
-def read_share(flight: Reconstruction) -> FloatArray:
-    """Share of the samples at which every fed-back channel was read [FED_BACK], of those where it was not absent."""
-    def make() -> FloatArray:
-        read, there = np.isfinite(flight.measured[:, :FED_BACK]), ~absent(flight)
-        return np.sum(read, axis=0) / np.maximum(np.sum(there, axis=0), 1)
-
-    return flight.once("read", make)
-
-
-def absent(flight: Reconstruction) -> NDArray[np.bool_]:
-    """Where a fed-back channel is absent for longer than the time between its readings tells [N, FED_BACK].
-
-    One that was never read is absent nowhere.
-    """
-    def lost(values: FloatArray) -> NDArray[np.bool_]:
-        read = np.isfinite(values)
-        return gaps(flight.time, flight.time[read], GAP) if read.any() else read
-
-    return flight.once("absent", lambda: np.column_stack([lost(v) for v in flight.measured[:, :FED_BACK].T]))
 
 
 def _gusts(flight: Reconstruction, sigma: float) -> tuple[FloatArray, list[int]]:
@@ -156,17 +145,17 @@ def _gusts(flight: Reconstruction, sigma: float) -> tuple[FloatArray, list[int]]
 
 
 def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, sigma: float, Qw: FloatArray,
-           noise: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+           noise: FloatArray, read: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """A, C, and the covariances of the states' noise, the readings' noise and between them.
 
     Args:
         sigma: gust intensity.
         Qw: covariance of what drives the gusts.
         noise: variance of every fed-back channel's own noise.
+        read: share of the steps at which each is read, where every step is to count as so much of a reading.
     """
     worse = flight.inadequacy.walk
     walk = np.array([np.hypot(worse * WALK.get(n, 1e-6), WALK_OF_GUST.get(n, 0.0) * sigma) for n in TANGENT])
-    read = read_share(flight)
     least = np.array([NOISE_FLOOR[name] for name in MEASURED[:FED_BACK]])
     G, D = A[:, DRYDEN], C[:, DRYDEN]
     driven = np.concatenate([flight.surface_noise, flight.power_noise])
@@ -195,18 +184,29 @@ def _within_steps(A: FloatArray, Qw: FloatArray) -> FloatArray:
     return out
 
 
-def roughness(A: FloatArray, C: FloatArray, G: FloatArray, D: FloatArray, Qw: FloatArray) -> FloatArray:
+def roughness(A: FloatArray, C: FloatArray, G: FloatArray, D: FloatArray, Qw: FloatArray,
+              every: Sequence[int]) -> FloatArray:  # fmt: skip
     """What gusts add to each channel's noise variance as third differences tell it [channels].
 
     At sigma_w = 1.5 m/s they double the apparent noise of az; believed, it makes the gain too small, the innovations
     coloured, and the colour looks like a vane's scale and a downwash lag.
+
+    Args:
+        every: steps from one reading of each channel to the next.
     """
-    response, state = [np.zeros_like(D)] * 3 + [D], G
+    response, state = [D], G
     for _ in range(ROUGH):
         response.append(C @ state)
         state = A @ state
-    third = np.diff(np.array(response), 3, axis=0)
-    return np.asarray(np.einsum("nci,ij,ncj->c", third, Qw, third) / 20.0)
+    series = np.array(response)  # [steps, channels, draws]
+    out = np.empty(len(C))
+    for m in sorted(set(every)):
+        third = np.concatenate([np.zeros((3 * m, *D.shape)), series])
+        for _ in range(3):
+            third = third[m:] - third[:-m]
+        own = np.array(every) == m
+        out[own] = np.einsum("nci,ij,ncj->c", third, Qw, third)[own] / 20.0
+    return out
 
 
 def _steady(

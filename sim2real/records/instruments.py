@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from estimators.compatibility.flow_angles import at_centre_of_gravity
 from estimators.signals.instruments import calibration, rate, time_constant
+from estimators.signals.mending import mended
 from estimators.signals.resample import common_grid
 from icing_env import aircraft
 from icing_env.errors import InputError
@@ -67,26 +68,38 @@ def recorder_lags(records: Sequence[FlightRecord]) -> list[tuple[float, float]] 
     square). Errors are those of spans of all records that count as one each (Liang & Zeger's sandwich, Biometrika 73,
     1986): of one record's few spans they come out far too small by luck.
     """
-    spans = [found for record in records if (found := _of_attitudes(record)) is not None]
+    spans = [found for record in records if (found := _of_attitudes(mended(record))) is not None]
     return [_lead([own[axis] for own in spans]) for axis in (0, 1)] if spans else None
 
 
 def _of_attitudes(record: FlightRecord) -> tuple[FloatArray, FloatArray] | None:
     """Rate, angle, other angle and what is missing of the angle's integral in spans [spans, samples, 4], both axes."""
-    sparse = [n for n in RATES if n not in record.channels or np.mean(~np.isfinite(record[n])) > MISSING]
-    if sparse or len(record) < 20 * FEWEST:
+    if any(n not in record.channels for n in RATES) or len(record) < 20 * FEWEST:
+        return None
+    missing = {n: float(np.mean(~np.isfinite(record[n]))) for n in RATES}
+    at = np.arange(len(record)) if max(missing.values()) <= MISSING else _slow_attitudes(record, missing)
+    if len(at) < 20 * FEWEST:
         return None
     grid = common_grid(record)
     p, q, r, phi, theta = (grid.values[n] for n in RATES)
     turning = q * np.sin(phi) + r * np.cos(phi)
-    return (_in_spans(theta, q * np.cos(phi) - r * np.sin(phi), phi, grid.dt),
-            _in_spans(phi, p + np.tan(theta) * turning, theta, grid.dt))
+    return (_in_spans(theta, q * np.cos(phi) - r * np.sin(phi), phi, grid.dt, at),
+            _in_spans(phi, p + np.tan(theta) * turning, theta, grid.dt, at))
 
 
-def _in_spans(angle: FloatArray, turns: FloatArray, other: FloatArray, dt: float) -> FloatArray:
+def _slow_attitudes(record: FlightRecord, missing: dict[str, float]) -> NDArray[np.intp]:
+    """Rows at which both attitudes were sampled, if at every so manieth row beside rates at all; else none."""
+    rows = np.flatnonzero(np.isfinite(record["phi"]) & np.isfinite(record["theta"]))
+    step = np.diff(rows)
+    even = len(step) > 0 and step.max() == step.min() and np.ptp(np.diff(record.time)) < 0.01 * record.dt
+    return rows if even and max(missing[n] for n in RATES[:3]) <= MISSING else rows[:0]
+
+
+def _in_spans(angle: FloatArray, turns: FloatArray, other: FloatArray, dt: float, at: NDArray[np.intp]) -> FloatArray:
+    """Columns of `_of_attitudes` less a line in every span; `at`: rows at which the angles were sampled."""
     made = np.concatenate([[0.0], np.cumsum(0.5 * (turns[1:] + turns[:-1]) * dt)])
-    columns = np.column_stack([turns, angle, other, angle - made])
-    length = min(round(SPAN / dt), len(made) // FEWEST)
+    columns = np.column_stack([turns, angle, other, angle - made])[at[at < len(made)]]
+    length = min(round(SPAN / (dt * float(np.median(np.diff(at))))), len(columns) // FEWEST)
     spans = columns[: len(columns) // length * length].reshape(-1, length, 4)
     line = np.linalg.qr(np.column_stack([np.ones(length), np.linspace(-1.0, 1.0, length)]))[0]
     return np.asarray(spans - line @ (line.T @ spans))

@@ -21,10 +21,12 @@ from icing_env.atmosphere import density, static_air
 from icing_env.errors import InputError
 from icing_env.record import DataProblem, FlightRecord, FloatArray
 from sim2real.records import instruments
-from sim2real.records.channels import LATERAL, MEASURED, NOISE_FLOOR, SURFACE_NOISE, SURFACES
-from sim2real.records.noise import step_noise, white
+from sim2real.records.channels import LATERAL, MEASURED, SURFACE_NOISE, SURFACES
+from sim2real.records.noise import channel_noise, power_noise
 from sim2real.records.powers import powers
+from sim2real.records.rounding import SEVERAL, rounding
 
+STILL = ("altitude", "thrust_left", "thrust_right")  # channels of which a constant reading says less than nothing
 LONGEST_STEP, SHORTEST_STEP = 0.1, 0.018  # s: records are 10 to 200 Hz; faster ones are thinned to about 50 Hz
 TIMING = 0.002  # s: command and position are no better in step, nor is the actuator exactly of first order (assumed)
 T = TypeVar("T")
@@ -69,6 +71,7 @@ class Reconstruction:
         notes: what was assumed.
         known: accelerations (m/s2 along x, y, z, rad/s2 about them) that the model is given beside its own [N, 6]: what
             another simulator has and ours has not (`sim2real.rollout`).
+        unseen: `noise` where it is more than differences of the samples show (rounding, interpolation), else zero.
         surface_noise: standard deviation of the SURFACES in `controls` [3], rad, sample by sample.
         power_noise: the same of the powers left and right [2], W: of white noise that moves the aircraft as much.
         about: the condition, by quantity, that generic terms count deviations from; the record's medians if left out.
@@ -92,6 +95,7 @@ class Reconstruction:
     noise: FloatArray
     notes: tuple[str, ...]
     known: FloatArray | None = None
+    unseen: FloatArray = field(default_factory=lambda: np.zeros(len(MEASURED)))
     surface_noise: FloatArray = field(default_factory=lambda: np.full(len(SURFACES), SURFACE_NOISE))
     power_noise: FloatArray = field(default_factory=lambda: np.zeros(2))
     about: dict[str, float] = field(default_factory=dict)
@@ -132,31 +136,18 @@ def reconstruct(record: FlightRecord, base: NDArray | None = None) -> Reconstruc
         InputError: the record is wrong or lacks what a longitudinal diagnosis needs.
     """
     record = check(record)
-    grid = common_grid(record)
-    values, time = dict(grid.values), grid.time - grid.time[0]
-    lacking = [n for n in LONGITUDINAL if n not in values]
-    if lacking:
-        raise InputError(f"record '{record.meta.name}' lacks {', '.join(lacking)}: a diagnosis needs "
-                         f"time, {', '.join(LONGITUDINAL)}")
-    if grid.dt > LONGEST_STEP * 1.01:
-        raise InputError(f"record '{record.meta.name}' has {1/grid.dt:.3g} samples/s; at least 10 are needed")
-    record = record.with_problems(_unrecorded(values, record))
-    every = max(1, round(0.02 / grid.dt)) if grid.dt < SHORTEST_STEP else 1
     notes: list[str] = []
-    if every > 1:
-        notes.append(f"thinned from {1/grid.dt:.0f} to {1/(grid.dt*every):.0f} samples/s")
-    time, dt = time[::every], grid.dt * every
-    values = {n: v[::every] for n, v in values.items()}
+    at, dt, values = _steps(record, notes)
+    record = record.with_problems(_unrecorded(values, record))
     row = _airframe(record, aircraft.load() if base is None else base.copy(), values, notes)
     instruments.declared(row, record, values, dt, notes)
-    measured = _measured(record, grid.time[::every], values, dt)
+    measured = _measured(record, at, values, dt)
     altitude = _air(row, values, notes)
     row["wind_reference_altitude"] = float(np.median(altitude))  # a steady wind shows nowhere; only its change does
-    moved = {n: values[n] if n in values else np.zeros(len(time)) for n in SURFACES}
+    moved = {n: values[n] if n in values else np.zeros(len(at)) for n in SURFACES}
     controls = {n: unfiltered(v, float(row["filter_frequency"][0]), dt) for n, v in moved.items()}
-    at = grid.time[::every]
     positions = {n: np.where(_sampled(record, n, at, dt) & (n in values), v, np.nan) for n, v in moved.items()}
-    controls["flap"] = values.get("flap", np.zeros(len(time)))
+    controls["flap"] = values.get("flap", np.zeros(len(at)))
     notes.extend(f"{n} not recorded: " + ("where its command puts it" if f"{n}_command" in values else "taken as zero")
                  for n in SURFACES if n not in values)
     source, driving = powers(row, values, altitude, dt, notes)
@@ -166,13 +157,33 @@ def reconstruct(record: FlightRecord, base: NDArray | None = None) -> Reconstruc
     for name in MEASURED[-2:]:
         if source != "torque":
             measured[:, MEASURED.index(name)] = np.nan  # it drives the simulation: nothing is left to compare
-    shaking = np.array([step_noise(driving[f"power_{side}"],
-                                   _sampled(record, "ax" if source == "balance" else f"{source}_{side}", at, dt))
-                        for side in ("left", "right")])
+    told_by = {side: "ax" if source == "balance" else f"{source}_{side}" for side in ("left", "right")}
+    shaking = np.array([power_noise(record, name, driving[f"power_{side}"], _sampled(record, name, at, dt))
+                        for side, name in told_by.items()])  # fmt: skip
+    noise, unseen = channel_noise(measured, record, source)
+    surface_noise = np.maximum(SURFACE_NOISE, [rounding(positions[n], SEVERAL) for n in SURFACES])
     if source == "balance":
         measured[:, MEASURED.index("ax")] = np.nan  # so does it
-    return Reconstruction(record.meta.name, record, time, dt, measured, controls, positions, commands, row, altitude,
-                          source, _noise(measured), tuple(notes), power_noise=shaking)
+    return Reconstruction(record.meta.name, record, at - at[0], dt, measured, controls, positions, commands, row,
+                          altitude, source, noise, tuple(notes), unseen=unseen, surface_noise=surface_noise,
+                          power_noise=shaking)
+
+
+def _steps(record: FlightRecord, notes: list[str]) -> tuple[FloatArray, float, dict[str, FloatArray]]:
+    """Times of the steps that a record is simulated in (N,), s, the length of one, and every channel at them (N,).
+
+    Raises:
+        InputError: too few samples, or a channel that a longitudinal diagnosis needs is not there.
+    """
+    grid, where = common_grid(record), f"record '{record.meta.name}'"
+    if lacking := [n for n in LONGITUDINAL if n not in grid.values]:
+        raise InputError(f"{where} lacks {', '.join(lacking)}: a diagnosis needs time, {', '.join(LONGITUDINAL)}")
+    if grid.dt > LONGEST_STEP * 1.01:
+        raise InputError(f"{where} has {1/grid.dt:.3g} samples/s; at least 10 are needed")
+    every = max(1, round(0.02 / grid.dt)) if grid.dt < SHORTEST_STEP else 1
+    if every > 1:
+        notes.append(f"thinned from {1/grid.dt:.0f} to {1/(grid.dt*every):.0f} samples/s")
+    return grid.time[::every], grid.dt * every, {n: v[::every] for n, v in grid.values.items()}
 
 
 def _unrecorded(values: dict[str, FloatArray], record: FlightRecord) -> list[DataProblem]:
@@ -185,10 +196,10 @@ def _unrecorded(values: dict[str, FloatArray], record: FlightRecord) -> list[Dat
 
 
 def _measured(record: FlightRecord, time: FloatArray, values: dict[str, FloatArray], dt: float) -> FloatArray:
-    """Samples at the steps; channels slower than the steps stay blank between their samples."""
+    """Samples at the steps; blank between those of slower channels, and where one reads the same throughout."""
     out = np.full((len(time), len(MEASURED)), np.nan)
     for j, name in enumerate(MEASURED):
-        if name not in values:
+        if name not in values or (name in STILL and not np.ptp(values[name])):
             continue
         near = _sampled(record, name, time, dt)
         out[near, j] = values[name][near]
@@ -246,14 +257,6 @@ def unfiltered(values: FloatArray, frequency: float, dt: float) -> FloatArray:
     share = 1.0 - math.exp(-2.0 * math.pi * frequency * dt)
     out = values.copy()
     out[1:] = (values[1:] - (1.0 - share) * values[:-1]) / share
-    return out
-
-
-def _noise(measured: FloatArray) -> FloatArray:
-    """Noise of each channel from its third differences (their variance is 20 times that of white noise), robustly."""
-    out = np.array([NOISE_FLOOR[name] for name in MEASURED])
-    for j in range(measured.shape[1]):
-        out[j] = max(out[j], white(measured[np.isfinite(measured[:, j]), j]))
     return out
 
 
