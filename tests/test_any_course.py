@@ -61,6 +61,15 @@ def test_what_acts_somewhere_shows_there(course, target, component, size):
     assert best.component == component and best.log_evidence > 20.0
 
 
+def test_long_records_take_their_components_one_by_one_and_say_the_same(course, monkeypatch):
+    assert course.bytes == pytest.approx(course.rows("rolling_moment").nbytes, rel=0.1)
+    together = fits(course, "r", 0.01)
+    monkeypatch.setattr("sim2real.posterior.any_course.MOST", 1.0)
+    for one, other in zip(fits(course, "r", 0.01), together, strict=True):
+        assert one.component == other.component
+        assert (one.log_evidence, one.left) == pytest.approx((other.log_evidence, other.left), rel=1e-9)
+
+
 def test_a_component_counts_terms_and_course_and_tells_the_likelier():
     terms, course = (UnknownFit("x_force", log, (("1", 1.0, 0.1),), 10.0, {}) for log in (2.0, 9.0))
     other = UnknownFit("y_force", 1.0, (("1", 1.0, 0.1),), 10.0, {})

@@ -20,7 +20,7 @@ from sim2real.signatures.courses import Course, Courses, Remainder, in_time
 
 SIZES = (0.003, 0.01, 0.03, 0.1, 0.3)  # standard deviations of the heights, in units of a generic coefficient (assumed)
 SHARE = 1.0 / 3.0  # prior share of what is unknown at a component that generic terms do not follow (assumed)
-TOGETHER = 7  # components whose responses are computed at once
+TOGETHER, MOST = 7, 5e8  # components whose responses are computed at once, and bytes that these may take
 PLACES = in_time({component for component, _, _ in (*GENERIC, *BEYOND)})
 
 
@@ -60,8 +60,9 @@ def _products(course: Course, places: Sequence[str], parts: Sequence[FloatArray]
     if keep:
         return {place: (course.inner(place, place), course.onto(place, parts)) for place in places}
     found, other = {}, np.concatenate(parts, axis=1)
-    for k in range(0, len(places), TOGETHER):
-        for component, rows in course.made(places[k : k + TOGETHER]).items():
+    at_once = max(1, min(TOGETHER, int(MOST / course.bytes)))
+    for k in range(0, len(places), at_once):
+        for component, rows in course.made(places[k : k + at_once]).items():
             found[component] = np.asarray(rows.T @ rows), np.asarray(rows.T @ other)
     return found
 

@@ -16,7 +16,7 @@ import numpy as np
 from icing_env.record import FloatArray
 from sim2real.actuators.lateness import Late
 from sim2real.actuators.paths import PATHS
-from sim2real.library.terms import Term, at_any_time, pushes
+from sim2real.library.terms import KNOT, Term, at_any_time, pushes
 from sim2real.prediction.predictor import Push
 from sim2real.records.side_by_side import each
 from sim2real.signatures.evidence import Evidence
@@ -78,6 +78,11 @@ class Course:
     def model(self) -> FloatArray:
         """What the model leaves of the record [N x channels, 1]."""
         return self.evidence.whitened[self.about.first :].reshape(-1, 1)
+
+    @property
+    def bytes(self) -> float:
+        """Of what hats at one component make of the record: with its length squared."""
+        return 8.0 * len(self.model) * float(np.ptp(self.about.flight.time)) / KNOT
 
     def pushes(self, terms: Sequence[Term]) -> tuple[Push, ...]:
         """Time courses of generic terms along the record as the model predicts it."""
