@@ -1,10 +1,10 @@
 """What is wrong with a record: each fault is named, then mended and reported, or the record is refused.
 
-Mended: repeated instants (dropped), constant channels (set aside), frozen stretches and spikes (left out,
-interpolated where short), thrust that cannot be in N (set aside). Refused: too few samples, time running backwards, a
-wrong unit, a reversed sign. Signs and units are judged by magnitudes, by the motion and by what lift and drag can be;
-where a record says nothing of a channel on which its derivatives rest, that is among its problems too. Thresholds are
-assumed; they leave clean records with sensor noise and turbulence untouched.
+Mended: repeated instants (dropped), stamps that jitter where samples do not (evened), constant channels (set aside),
+frozen stretches and spikes (left out, interpolated where short), thrust that cannot be in N (set aside). Refused: too
+few samples, time running backwards, a wrong unit, a reversed sign. Signs and units are judged by magnitudes, by the
+motion and by what lift and drag can be; where a record says nothing of a channel on which its derivatives rest, that is
+among its problems too. Thresholds are assumed; they leave clean records with sensor noise and turbulence untouched.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from estimators.signals.kinematic_checks import check_kinematics
 from estimators.signals.magnitudes import check_magnitudes
 from estimators.signals.mending import FEWEST, mended
 from estimators.signals.resample import Grid, common_grid
+from estimators.signals.stamps import evenly_spaced
 from icing_env.errors import InputError
 from icing_env.record import DataProblem, FlightRecord
 
@@ -42,7 +43,7 @@ def check(record: FlightRecord) -> FlightRecord:
         )
     where = f"record '{record.meta.name}'"
     check_magnitudes(record)
-    record = mended(record)
+    record = evenly_spaced(mended(record))
     grid = common_grid(calibrated(record))  # signs and units are judged without the lags that are known
     confirmed = check_kinematics(grid, where)
     if check_lift_slope(where, grid, record) or record.has("ground_speed"):
