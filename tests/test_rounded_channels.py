@@ -83,6 +83,17 @@ def test_noise_of_a_rounded_channel_is_its_rounding_and_others_are_as_they_were(
     assert (plain.surface_noise == SURFACE_NOISE).all() and (rounded.surface_noise > 1.1 * SURFACE_NOISE).all()
 
 
+def test_a_rounded_torque_is_noise_and_a_lever_that_stands_still_is_not():
+    record = flown(3)
+    rounded = reconstruct(on_levels(record, {"torque_left": 20.0, "torque_right": 20.0}))
+    assert (rounded.power_noise > 2.0 * reconstruct(record).power_noise).all()
+    without = {n: c for n, c in record.channels.items() if not n.startswith(("torque", "thrust", "rpm"))}
+    stepped = {f"throttle_{side}": np.where(record.time < 20.0, 0.5, 0.7) for side in ("left", "right")}
+    levers = reconstruct(replace(record, channels=without | stepped))
+    assert levers.power_from == "throttle"
+    assert (levers.power_noise < 1.0).all()  # W
+
+
 def test_a_rounded_surface_follows_its_command_all_the_same():
     sharp, rounded = placed(reconstruct(flown(3))), placed(reconstruct(on_levels(flown(3), LEVELS)))
     for j, surface in enumerate(("elevator", "aileron", "rudder")):

@@ -59,12 +59,16 @@ def channel_noise(measured: FloatArray, record: FlightRecord, power_from: str) -
 
 
 def power_noise(record: FlightRecord, name: str, power: FloatArray, sampled: NDArray[np.bool_]) -> float:
-    """Noise of a power [W] that comes from a channel, a draw a step: what its samples show, or their rounding.
+    """Noise of a power [W] that comes from a channel, a draw a step: what its samples show, or a reading's rounding.
+
+    A lever stands still for as long as nobody moves it.
 
     Args:
         power: at the steps [N].
         sampled: where the channel was [N].
     """
     shown = step_noise(power, sampled)
+    if not name.startswith(("torque", "thrust")):
+        return shown
     rounded = share_rounded(record, name) * float(np.median(np.abs(power)))
     return max(shown, rounded * math.sqrt(len(power) / max(int(np.count_nonzero(sampled)), 1)))
