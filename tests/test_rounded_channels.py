@@ -90,6 +90,8 @@ def test_a_rounded_torque_is_noise_and_a_lever_that_stands_still_is_not():
     without = {n: c for n, c in record.channels.items() if not n.startswith(("torque", "thrust", "rpm"))}
     stepped = {f"throttle_{side}": np.where(record.time < 20.0, 0.5, 0.7) for side in ("left", "right")}
     levers = reconstruct(replace(record, channels=without | stepped))
+    thrust = {f"thrust_{side}": 4000.0 * stepped[f"throttle_{side}"] for side in ("left", "right")}
+    assert (reconstruct(replace(record, channels=without | thrust)).power_noise < 2e3).all()  # steps, and no levels
     assert levers.power_from == "throttle"
     assert (levers.power_noise < 1.0).all()  # W
 

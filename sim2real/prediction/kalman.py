@@ -105,7 +105,7 @@ def gains(flight: Reconstruction, sigmas: tuple[float, ...]) -> list[Gain]:
         steady, S = _steady(*model)
         for c, m in enumerate(apart(flight)):
             if m > 1:  # so many steps' corrections at once are less than as many times one
-                one = min(float(C[c] @ steady[:, c]), 1.0)
+                one = min(max(float(C[c] @ steady[:, c]), 1e-9), 1.0)
                 steady[:, c] *= (1.0 - (1.0 - one) ** m) / (one * m)
         out.append(Gain(sigma, steady[None], S, model, round(TRANSIENT / flight.dt)))
     return out
