@@ -19,8 +19,9 @@ from sim2real.closing.remedy import Remedy
 from sim2real.diagnosis import diagnose
 from sim2real.library.candidates import bank
 from sim2real.library.terms import GENERIC, pushes
+from sim2real.prediction.as_predicted import predicted
 from sim2real.prediction.kalman import gains
-from sim2real.prediction.predictor import innovations, predicted
+from sim2real.prediction.predictor import innovations
 from sim2real.records.reconstruct import reconstruct
 from testbed.flight import fly
 

@@ -15,8 +15,9 @@ from icing_env.aircraft import load
 from icing_env.record import read
 from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import _reconstructed
+from sim2real.prediction.as_predicted import as_predicted
 from sim2real.prediction.kalman import _within_steps, follow, gains, gust_noise, linearise, roughness
-from sim2real.prediction.predictor import TANGENT, Predictor, as_predicted, innovations
+from sim2real.prediction.predictor import TANGENT, Predictor, innovations
 from sim2real.prediction.readings import apart
 from sim2real.records.channels import FED_BACK, MEASURED
 from sim2real.records.noise import step_noise
@@ -104,7 +105,7 @@ def test_channels_that_are_slow_or_stop_are_worth_their_samples(tmp_path, sample
 
 @pytest.mark.parametrize("slow", [("alpha",), ("beta",), ("airspeed", "alpha", "beta"), ("p", "q", "r", "alpha")])
 def test_innovations_beside_slow_channels_are_white_and_of_their_size(tmp_path, slow):
-    """Gains are exact there: counted as five corrections at once, a vane at 10 Hz left 22 times q's variance."""
+    """With the noise that their samples show; a vane that is believed to have next to none colours the airspeed."""
     squares, means = [], []
     for seed in range(SEEDS):
         flight = slowly(flown(tmp_path, 1.5, seed), slow)
@@ -147,12 +148,23 @@ def test_predictions_between_slow_readings_know_nothing_that_comes_later(tmp_pat
     gain, later = follow(flight, gains(flight, (1.5,))[0]), 1003  # between two readings of alpha
     measured = flight.measured.copy()
     measured[later:, MEASURED.index("az")] += 3.0
-    before, after = (as_predicted(f, innovations(f, f.parameters, gain.K)[:, 0], gain.K, True).channel("alpha")
+    before, after = (as_predicted(f, innovations(f, f.parameters, gain.K)[:, 0], gain).channel("alpha")
                      for f in (flight, replace(flight, measured=measured)))  # fmt: skip
     np.testing.assert_array_equal(before[: later + 1], after[: later + 1])
     assert np.max(np.abs(before[later + 1 : later + 10] - after[later + 1 : later + 10])) > 1e-3
     every = flown(tmp_path, 1.5, 0).channel("alpha")
     assert np.std(before[200:] - every[200:]) < 2.5 * flight.noise[MEASURED.index("alpha")]
+
+
+def test_predictions_where_a_slow_altitude_is_absent_are_numbers(tmp_path):
+    """What was filled there is predicted, and between the other readings there are none to predict."""
+    flight = kept(flown(tmp_path, 0.5, 0), {"altitude": slice(0, None, 5)})
+    measured = flight.measured.copy()
+    measured[500:700, MEASURED.index("altitude")] = np.nan
+    flight = replace(flight, measured=measured)
+    gain = follow(flight, gains(flight, (0.5,))[0])
+    told = as_predicted(flight, innovations(flight, flight.parameters, gain.K)[:, 0], gain).channel("altitude")
+    assert np.max(np.abs(told - flown(tmp_path, 0.5, 0).channel("altitude"))[200:]) < 3.0
 
 
 def test_gusts_between_samples_disturb_as_much_as_flights_show(tmp_path):

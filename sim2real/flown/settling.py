@@ -16,9 +16,10 @@ from sim2real.library.candidates import NUISANCE_STEP, Bank, shifted
 from sim2real.library.terms import pushes
 from sim2real.posterior.attribution import nuisance_mean, reduce, with_prior
 from sim2real.posterior.hypotheses import Hypothesis
+from sim2real.prediction.as_predicted import as_predicted
 from sim2real.prediction.kalman import Gain, follow, gains
-from sim2real.prediction.predictor import Push, as_predicted, innovations
-from sim2real.prediction.readings import apart
+from sim2real.prediction.predictor import Push, innovations
+from sim2real.prediction.readings import slow
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.records.side_by_side import each
 from sim2real.signatures.evidence import Evidence, gather
@@ -60,7 +61,7 @@ def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseli
 def _at_first(flight: Reconstruction) -> Gain:
     """The gain of the record's likeliest gusts, along it where a channel is slow."""
     found = choose_gain(flight, gains(flight, SIGMAS))
-    return follow(flight, found) if max(apart(flight)) > 1 else found.with_start()
+    return follow(flight, found) if slow(flight) else found.with_start()
 
 
 def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline
@@ -167,10 +168,9 @@ def _pushed(evidence: Evidence, flight: Reconstruction, candidates: Bank, weight
     terms = [term for term in candidates.terms if term.row in weights]
     if not terms:
         return []
-    gain = evidence.gain
-    left = innovations(flight, flight.parameters, gain.K)[:, 0]
+    left = innovations(flight, flight.parameters, evidence.gain.K)[:, 0]
     return [replace(push, series=weights[push.row] * push.series)
-            for push in pushes(as_predicted(flight, left, gain.K, gain.S.ndim == 3), terms)]
+            for push in pushes(as_predicted(flight, left, evidence.gain), terms)]
 
 
 def unlike(one: Gain, other: Gain) -> float:

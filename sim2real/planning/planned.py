@@ -24,6 +24,7 @@ from sim2real.planning.manoeuvre import MANOEUVRES, Manoeuvre, asked, flown
 from sim2real.prediction.kalman import follow as follow_gain
 from sim2real.prediction.kalman import gains, gust_noise, linearise, roughness
 from sim2real.prediction.predictor import TANGENT
+from sim2real.prediction.readings import apart
 from sim2real.records.channels import FED_BACK, G0, MEASURED, NOISE_FLOOR, SURFACES
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.evidence import compare
@@ -185,7 +186,7 @@ def _apparent(made: Reconstruction, sigma: float) -> FloatArray:
     C = C[:FED_BACK]
     columns = [TANGENT.index(n) for n in TANGENT if n.startswith("dryden")]
     Qw = gust_noise(sigma, float(np.median(made.channel("airspeed"))), float(np.median(made.altitude)), made.dt)
-    added = roughness(A, C, A[:, columns], C[:, columns], Qw, [1] * len(C))
+    added = roughness(A, C, A[:, columns], C[:, columns], Qw, apart(made))
     out = made.noise.copy()
     out[:FED_BACK] = np.sqrt(out[:FED_BACK] ** 2 + added)
     return out

@@ -54,6 +54,11 @@ class Gain:
     model: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
     duration: int
 
+    @property
+    def along(self) -> bool:
+        """Whether it is that of every step of a record (`follow`)."""
+        return self.S.ndim == 3
+
     def with_start(self) -> Gain:
         """The same with gains of their own for the first steps, from the uncertainty of the start."""
         always = np.zeros((self.duration, len(self.model[1])))
@@ -94,19 +99,15 @@ def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),)) -
 def gains(flight: Reconstruction, sigmas: tuple[float, ...]) -> list[Gain]:
     """Steady gain and innovation covariance for each gust intensity."""
     A, C, B = (matrix[0] for matrix in linearise(flight))
-    C, out = C[:FED_BACK], list[Gain]()
+    C, out, every = C[:FED_BACK], list[Gain](), apart(flight)
+    seen = flight.noise[:FED_BACK] ** 2
+    # far apart, samples differ by gusts most of all: what is left of that says little, and too much harms less
+    least = np.where(np.array(every) > 1, SURE * seen, 0.0)
     for sigma in sigmas:
         Qw, columns = _gusts(flight, sigma)
-        rough = roughness(A, C, A[:, columns], C[:, columns], Qw, apart(flight))
-        # far apart, samples differ by gusts most of all: what is left of that says little, and too much harms less
-        seen = flight.noise[:FED_BACK] ** 2
-        noise = np.maximum(seen - rough, np.where(np.array(apart(flight)) > 1, SURE * seen, 0.0))
+        noise = np.maximum(seen - roughness(A, C, A[:, columns], C[:, columns], Qw, every), least)
         model = _noisy(flight, A, C, B, sigma, Qw, noise, read_share(flight))
         steady, S = _steady(*model)
-        for c, m in enumerate(apart(flight)):
-            if m > 1:  # so many steps' corrections at once are less than as many times one
-                one = min(max(float(C[c] @ steady[:, c]), 1e-9), 1.0)
-                steady[:, c] *= (1.0 - (1.0 - one) ** m) / (one * m)
         out.append(Gain(sigma, steady[None], S, model, round(TRANSIENT / flight.dt)))
     return out
 

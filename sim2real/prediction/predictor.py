@@ -10,7 +10,7 @@ System Identification, 2nd ed., chapter 7; gain with correlated noises: Anderson
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import llvmlite.binding
@@ -23,7 +23,6 @@ from icing_env.record import FloatArray
 from icing_env.simulate import Fleet
 from icing_env.types import STATE
 from sim2real.prediction.along import CONTROLS, SLOW_SURFACE, STATES, STILL, X, along, columns, read, turn
-from sim2real.prediction.readings import unread
 from sim2real.records.channels import FED_BACK, MEASURED, SURFACES
 from sim2real.records.reconstruct import Reconstruction
 
@@ -113,29 +112,6 @@ class Predictor:
         phi = np.arctan2(2.0 * (e0 * e1 + e2 * e3), 1.0 - 2.0 * (e1 * e1 + e2 * e2))
         theta = np.arcsin(np.clip(2.0 * (e0 * e2 - e1 * e3), -1.0, 1.0))
         return np.column_stack([self.x[:, X], phi, theta])
-
-
-def as_predicted(flight: Reconstruction, left: FloatArray, gain: FloatArray, throughout: bool) -> Reconstruction:
-    """The record with one-step predictions in the place of readings, for the time courses made of them.
-
-    A slow channel is predicted between its readings too: a line from one to the next knows the later one, and with it
-    noise and gusts that nothing had told until then.
-
-    Args:
-        left: the model's innovations [N-1, channels].
-        gain: they were flown with.
-        throughout: whether that knows where nothing was read (`kalman.follow`).
-    """
-    told, blank = replace(flight, measured=predicted(flight, left)), unread(flight)
-    if not (throughout and blank.any()):
-        return told
-    measured = flight.measured.copy()
-    measured[:, :FED_BACK][blank] = 0.0  # a reading that the gain does not believe
-    filled = replace(flight, measured=measured)
-    again = innovations(filled, flight.parameters, gain * (stretch(flight) / stretch(filled)))[:, 0]
-    for c in np.flatnonzero(blank.any(axis=0)):
-        told.kept["channel", MEASURED[c]] = predicted(filled, again)[:, c]
-    return told
 
 
 def seen(flight: Reconstruction) -> FloatArray:
@@ -269,14 +245,3 @@ def lost(left: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
             gone = known[:, channel] & ~np.isfinite(left[:, row, channel])
             left[gone, row, channel] = LOST
     return left
-
-
-def predicted(flight: Reconstruction, left: FloatArray) -> FloatArray:
-    """One-step predictions of the channels [N, channels].
-
-    They carry no noise of the sample they belong to, so that time courses made of them cannot fit that noise.
-    """
-    out = flight.measured.copy()
-    out[1:] -= left
-    out[0] = out[1]
-    return out

@@ -39,6 +39,11 @@ def apart(flight: Reconstruction) -> list[int]:
     return [round(1.0 / share) if share > 0.0 and c != ALTITUDE else 1 for c, share in enumerate(read_share(flight))]
 
 
+def slow(flight: Reconstruction) -> bool:
+    """Whether a fed-back channel other than the altitude is read at every second step at the most."""
+    return max(apart(flight)) > 1
+
+
 def absent(flight: Reconstruction) -> NDArray[np.bool_]:
     """Where a fed-back channel is absent for longer than the time between its readings tells [N, FED_BACK].
 

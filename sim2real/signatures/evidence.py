@@ -17,8 +17,9 @@ from icing_env.record import FloatArray
 from sim2real.actuators.paths import counted, path_gram, path_residuals
 from sim2real.library.candidates import Bank, parameter_rows
 from sim2real.library.terms import Term, pushes
+from sim2real.prediction.as_predicted import as_predicted
 from sim2real.prediction.kalman import Gain, follow, gains
-from sim2real.prediction.predictor import Push, as_predicted, held, innovations, with_spare
+from sim2real.prediction.predictor import Push, held, innovations, with_spare
 from sim2real.records.channels import MEASURED
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
@@ -71,7 +72,7 @@ def gather(flight: Reconstruction, bank: Bank, gain: Gain | None = None) -> Evid
         gain = follow(flight, choose_gain(flight, gains(flight, SIGMAS)))
     base = innovations(flight, flight.parameters, gain.K)[:, 0]
     factor = whitening(base, gain, flight)
-    about = Filter(as_predicted(flight, base, gain.K, gain.S.ndim == 3), gain, factor, round(SETTLE / flight.dt))
+    about = Filter(as_predicted(flight, base, gain), gain, factor, round(SETTLE / flight.dt))
     known = about.respond(pushes(about.flight, bank.terms))
     return replace(compare(flight, parameter_rows(flight, bank), gain, factor, bank.terms, bank.linear, known),
                    linear=about)

@@ -10,7 +10,7 @@ import numpy as np
 from icing_env.record import FloatArray
 from sim2real.prediction.kalman import Gain, follow, gains
 from sim2real.prediction.predictor import LOST, Push, innovations
-from sim2real.prediction.readings import apart
+from sim2real.prediction.readings import slow
 from sim2real.records.channels import FED_BACK
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.whitening import SETTLE, factors, whiten
@@ -32,8 +32,7 @@ def choose_gain(flight: Reconstruction, options: list[Gain], pushed: Sequence[Pu
         options: in the order of their intensities.
         pushed: generic discrepancies that the model is flown with, whatever their rows.
     """
-    slow = max(apart(flight)) > 1  # whose gains at every step are too far from those that it needs to be judged by
-    scores = likelihoods(flight, [follow(flight, gain) for gain in options] if slow else options, pushed)
+    scores = likelihoods(flight, options, pushed)
     k = int(np.argmax(scores))
     if k in (0, len(options) - 1):
         return options[k]
@@ -44,7 +43,9 @@ def likelihoods(flight: Reconstruction, options: Sequence[Gain], pushed: Sequenc
     """Log likelihood of a sample's innovations with each of some gains, their size taken from medians.
 
     That of a filter which loses the record is minus infinity: what is lost is constant, and medians would call it calm.
+    Where a channel is slow, gains at every step are too far from those that it needs: gusts are judged by these.
     """
+    options = [follow(flight, gain) for gain in options] if slow(flight) else options
     everywhere = tuple(replace(push, row=i) for push in pushed for i in range(len(options)))
     left = innovations(flight, np.repeat(flight.parameters, len(options)), np.stack([g.K for g in options]), everywhere)
     left = left[round(SETTLE / flight.dt) :]
@@ -53,7 +54,7 @@ def likelihoods(flight: Reconstruction, options: Sequence[Gain], pushed: Sequenc
     together = seen[:, use].all(axis=1)
     scores = []
     for i, gain in enumerate(options):
-        if gain.S.ndim == 3:
+        if gain.along:
             scores.append(_along(left[:, i], gain, round(SETTLE / flight.dt)))
             continue
         S = gain.S[np.ix_(use, use)]

@@ -40,7 +40,7 @@ def factors(left: FloatArray, gain: Gain, use: NDArray[np.intp]) -> FloatArray:
     out = np.zeros((len(left), n, n))
     for pattern in np.unique(read, axis=0):
         own, at = use[pattern], np.flatnonzero((read == pattern).all(axis=1))
-        S = gain.S[at] if gain.S.ndim == 3 else gain.S
+        S = gain.S[at] if gain.along else gain.S
         out[np.ix_(at, own, own)] = np.linalg.inv(np.linalg.cholesky(S[..., own[:, None], own]))
     return out
 
