@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from sim2real.diagnosis import Diagnosis
@@ -39,18 +40,19 @@ def _finding(found: Diagnosis) -> str:
     if found.unknown and "places" in found.unknown and first["unknown"]:
         return _another_aircraft(found.unknown, named, sure)
     if found.verdict == "unknown" and not first["effects"]:
-        where = found.unknown["component"] + _late(found.unknown) if found.unknown else "nowhere in particular"
-        return f"There is a gap that nothing in the library explains; it enters at {where} ({sure})."
+        where = found.unknown["component"] if found.unknown else "nowhere in particular"
+        late = late_by(found.unknown) if found.unknown else 0.0
+        answers = f", which answers {late:.2g} s late" if late else ""
+        return f"There is a gap that nothing in the library explains; it enters at {where}{answers} ({sure})."
     if not first["effects"]:
         return "There is a gap, but no single explanation stands out."
     beside = ["something that the library lacks"] if first["unknown"] else []
     return f"The gap is best explained by {' and '.join(named + beside)} ({sure})."
 
 
-def _late(unknown: dict[str, Any]) -> str:
-    """By how much a path answers late, if that is all."""
-    delays = [t["coefficient"] for t in unknown["terms"] if t["term"] == PURE_DELAY]
-    return "".join(f", which answers {delay:.2g} s late" for delay in delays)
+def late_by(unknown: Mapping[str, Any]) -> float:
+    """By how much a path answers late [s], if that is what the library lacks; else zero."""
+    return float(sum(t["coefficient"] for t in unknown["terms"] if t["term"] == PURE_DELAY))
 
 
 def _another_aircraft(unknown: dict[str, Any], named: list[str], sure: str) -> str:

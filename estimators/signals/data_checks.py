@@ -43,7 +43,7 @@ def check(record: FlightRecord) -> FlightRecord:
         )
     where = f"record '{record.meta.name}'"
     check_magnitudes(record)
-    record = evenly_spaced(mended(record))
+    record = repaired(record)
     grid = common_grid(calibrated(record))  # signs and units are judged without the lags that are known
     confirmed = check_kinematics(grid, where)
     if check_lift_slope(where, grid, record) or record.has("ground_speed"):
@@ -51,6 +51,11 @@ def check(record: FlightRecord) -> FlightRecord:
     record = without_doubtful_thrust(record, grid)
     known = set(record.problems)
     return record.with_problems(p for p in (*grid.problems, *_unconfirmed(grid, confirmed)) if p not in known)
+
+
+def repaired(record: FlightRecord) -> FlightRecord:
+    """The record with what can be mended without judging it: channels, then stamps; told in its `problems`."""
+    return evenly_spaced(mended(record))
 
 
 def _increasing(record: FlightRecord) -> FlightRecord:

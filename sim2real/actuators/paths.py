@@ -46,14 +46,12 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
     out = []
     for surface in (s for s in SURFACES if moves(flight, s)):
         rows = _differing(parameters, [f"{surface}_{quantity}" for quantity in ACTUATOR])
-        measured, good = flight.positions[surface], np.isfinite(flight.positions[surface])
-        command = flight.commands[f"{surface}_command"]
-        predicted = follow(command, measured[good][0], parameters[rows], surface, flight.dt)
+        predicted = answered(flight, surface, parameters[rows])
         own = [term for term in terms if term.component == f"{surface}_path"]
         courses = path_courses(flight, predicted[:, 0], [term.name for term in own])
         added = [predicted[:, 0] + course for course in courses]
-        left = np.where(good[:, None], measured[:, None] - np.column_stack([predicted, *added]), 0.0)
-        out.append((f"{surface}_path", _believed(flight, surface, left), rows + [term.row for term in own]))
+        left = _believed(flight, surface, np.column_stack([predicted, *added]))
+        out.append((f"{surface}_path", left, rows + [term.row for term in own]))
     return out + _engine_residuals(flight, parameters)
 
 
@@ -64,12 +62,17 @@ def late_squares(flight: Reconstruction, parameters: NDArray, surface: str, dela
     Args:
         first: sample from which it counts.
     """
-    measured, good = flight.positions[surface], np.isfinite(flight.positions[surface])
-    predicted = follow(flight.commands[f"{surface}_command"], measured[good][0], parameters, surface, flight.dt)[:, 0]
+    predicted = answered(flight, surface, parameters)[:, 0]
     time = flight.dt * np.arange(len(predicted))
     late = np.column_stack([np.interp(time - delay, time, predicted) for delay in delays])
-    left = np.where(good[:, None], measured[:, None] - late, 0.0)
-    return np.asarray(np.sum(_believed(flight, surface, left)[first:] ** 2, axis=0))
+    return np.asarray(np.sum(_believed(flight, surface, late)[first:] ** 2, axis=0))
+
+
+def answered(flight: Reconstruction, surface: str, parameters: NDArray) -> FloatArray:
+    """Position [N, rows] of a surface behind its recorded command, from where it was recorded first."""
+    measured = flight.positions[surface]
+    start = float(measured[np.isfinite(measured)][0])
+    return follow(flight.commands[f"{surface}_command"], start, parameters, surface, flight.dt)
 
 
 def moves(flight: Reconstruction, surface: str) -> bool:
@@ -79,8 +82,10 @@ def moves(flight: Reconstruction, surface: str) -> bool:
                 and np.isfinite(flight.positions[surface]).any())  # fmt: skip
 
 
-def _believed(flight: Reconstruction, surface: str, left: FloatArray) -> FloatArray:
+def _believed(flight: Reconstruction, surface: str, predicted: FloatArray) -> FloatArray:
     """What is left of a surface's positions [N, rows] over its noise: sample by sample, and a delay that lasts."""
+    measured = flight.positions[surface][:, None]
+    left = np.where(np.isfinite(measured), measured - predicted, 0.0)
     noise, delay, share = flight.once(("late", surface), lambda: _late(flight, surface))
     over = left / noise
     return np.asarray(over - share * delay * (delay.T @ over))

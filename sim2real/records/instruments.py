@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.compatibility.flow_angles import at_centre_of_gravity
+from estimators.signals.data_checks import repaired
 from estimators.signals.instruments import calibration, rate, time_constant
-from estimators.signals.mending import mended
 from estimators.signals.resample import common_grid
-from estimators.signals.stamps import evenly_spaced
 from icing_env import aircraft
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
@@ -69,7 +68,7 @@ def recorder_lags(records: Sequence[FlightRecord]) -> list[tuple[float, float]] 
     square). Errors are those of spans of all records that count as one each (Liang & Zeger's sandwich, Biometrika 73,
     1986): of one record's few spans they come out far too small by luck.
     """
-    spans = [found for record in records if (found := _of_attitudes(evenly_spaced(mended(record)))) is not None]
+    spans = [found for record in records if (found := _of_attitudes(repaired(record))) is not None]
     return [_lead([own[axis] for own in spans]) for axis in (0, 1)] if spans else None
 
 

@@ -52,7 +52,7 @@ def channel_noise(measured: FloatArray, record: FlightRecord, power_from: str) -
         more = max(white(samples) if len(samples) < THINNED * len(steps) else 0.0, rounding(samples))
         if name.startswith("thrust") and power_from == "torque":
             driven = share_rounded(record, name.replace("thrust", "torque")) * float(np.median(np.abs(samples)))
-            more = float(np.hypot(more, driven)) if driven else more
+            more = float(np.hypot(more, driven))
         out[j] = max(out[j], shown, more)
         unseen[j] = more if more > shown else 0.0
     return out, unseen

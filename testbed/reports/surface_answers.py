@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from icing_env.record import FloatArray
-from sim2real.actuators.paths import follow, moves
+from sim2real.actuators.paths import answered, moves
 from sim2real.diagnosis import Diagnosis
-from sim2real.library.terms import PURE_DELAY
 from sim2real.records.channels import SURFACES
 from sim2real.records.reconstruct import Reconstruction
+from sim2real.words import late_by
 from testbed.reports.plot_style import DEG
 from testbed.reports.plotting import time_histories
 
@@ -27,10 +27,10 @@ def by_surface(found: Diagnosis, result: Mapping[str, Any]) -> list[list[Any]]:
     rows = []
     for surface in SURFACES:
         flights = [f for f in found.details.flights if moves(f, surface)]
-        left = [np.concatenate([_predicted(f, surface, found, result)[k] - f.positions[surface] for f in flights])
-                for k in (0, 1) if flights]  # fmt: skip
+        left = [np.array(_predicted(f, surface, found, result)) - f.positions[surface] for f in flights]
         if left:
-            rows.append([f"{surface}_path", *(f"{DEG * float(np.sqrt(np.nanmean(x**2))):.3f}" for x in left)])
+            rms = DEG * np.sqrt(np.nanmean(np.concatenate(left, axis=1) ** 2, axis=1))
+            rows.append([f"{surface}_path", *(f"{degrees:.3f}" for degrees in rms)])
     return rows
 
 
@@ -59,16 +59,8 @@ def answer(found: Diagnosis, result: Mapping[str, Any], surface: str) -> Figure 
 def _predicted(flight: Reconstruction, surface: str, found: Diagnosis, result: Mapping[str, Any]
                ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Positions behind the model's actuator, and behind the one diagnosed, late by what it is late [N]."""
-    command, measured = flight.commands[f"{surface}_command"], flight.positions[surface]
-    start = float(measured[np.isfinite(measured)][0])
-    before, after = (follow(command, start, p, surface, flight.dt)[:, 0]
+    before, after = (answered(flight, surface, p)[:, 0]
                      for p in (flight.parameters, found.details.change(flight.parameters)))  # fmt: skip
-    return before, np.interp(flight.time - _delay(result, surface), flight.time, after)
-
-
-def _delay(result: Mapping[str, Any], surface: str) -> float:
-    """By which the diagnosis has a surface answer late [s]."""
     unknown = result["unknown"]
-    if not unknown or unknown["component"] != f"{surface}_path" or result["verdict"] != "unknown":
-        return 0.0
-    return float(sum(t["coefficient"] for t in unknown["terms"] if t["term"] == PURE_DELAY))
+    here = unknown and unknown["component"] == f"{surface}_path" and result["verdict"] == "unknown"
+    return before, np.interp(flight.time - (late_by(unknown) if here else 0.0), flight.time, after)
