@@ -14,6 +14,7 @@ from icing_env.effects.effect import ENTERS_AT
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, write
 from sim2real.records.reconstruct import reconstruct
+from testbed.benchmarks import answers
 from testbed.benchmarks import diagnosis as run
 from testbed.flight import fly
 from testbed.rivals import RIVALS, coefficients, scales, solve
@@ -170,7 +171,7 @@ def test_the_run_of_the_benchmark_asks_the_rivals_with_the_keys_closed(tmp_path)
     (tmp_path / "keys").mkdir()
     write(bad, tmp_path / "records" / "a" / "1.csv")
     said: list[str] = []
-    run._solve(tmp_path, "answers_bic", {"a": ("bic",)}, 1, said.append, run.solve_by)
+    answers.answer_all(tmp_path, "answers_bic", {"a": ("bic",)}, 1, said.append, run.solve_by)
     assert "theta" in json.loads((tmp_path / "answers_bic" / "a.json").read_text())["error"]
     assert said == ["answers_bic: 1 of 1"]
-    assert (tmp_path / "keys").stat().st_mode & 0o777 == run.OPEN
+    assert (tmp_path / "keys").stat().st_mode & 0o777 == answers.OPEN

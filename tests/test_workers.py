@@ -7,7 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
 from icing_env.errors import InputError
-from testbed.benchmarks.diagnosis import answered
+from testbed.benchmarks.answers import answered
 from testbed.workers import START, a_core_each
 
 

@@ -1,20 +1,14 @@
-"""Run the diagnosis over a sealed set of cases, without its keys, and score the answers.
-
-Worker processes get the paths of records and nothing else; the key folder is closed to reading meanwhile. Every
-answer is written as soon as it is there, so that an interrupted run goes on where it stopped.
-"""
+"""Run the diagnosis over a sealed set of cases, without its keys (`answers`), and score what it says."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
-from multiprocessing import get_context
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from icing_env.errors import InputError
+from testbed.benchmarks.answers import OPEN, Progress, answer_all, answered, diagnosis_of
 from testbed.benchmarks.failures import HEADERS, failures
 from testbed.benchmarks.failures import rows as failed_rows
 from testbed.benchmarks.ledger import enter, enter_draw
@@ -29,8 +23,6 @@ from testbed.withheld.score import DETECTABLE, identifiable, score
 from testbed.workers import a_core_each
 
 QUICK, FULL = 150, 2400
-OPEN = 0o700  # of the key folder outside the diagnosis
-Progress = Callable[[str], None]
 
 
 @a_core_each()
@@ -57,13 +49,14 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
     if ledger is not None:
         enter_draw(ledger, kind_of(committed), committed, out)
     names = sorted(committed["cases"])
-    _solve(out, "answers", dict.fromkeys(names, ()), workers, progress)
+    answer_all(out, "answers", dict.fromkeys(names, ()), workers, progress, solve)
     for rival in RIVALS if rivals else ():
-        _solve(out, f"answers_{rival}", dict.fromkeys(names, (rival,)), workers, progress, solve_by)
+        answer_all(out, f"answers_{rival}", dict.fromkeys(names, (rival,)), workers, progress, solve_by)
     removed = removals(out / "keys") if without else {}
     if without:  # only now, the ordinary answers being in, does the solver's side learn an effect of any case
         write_text(out / "without.json", json.dumps(removed, indent=1))
-        _solve(out, "answers_without", {name: ((effect,),) for name, effect in removed.items()}, workers, progress)
+        jobs = {name: ((effect,),) for name, effect in removed.items()}
+        answer_all(out, "answers_without", jobs, workers, progress, solve)
     refly(out / "answers", out / "keys", out / "refly", workers, progress)
     progress("scoring")
     there = [out / f"answers_{rival}" for rival in RIVALS if any((out / f"answers_{rival}").glob("*.json"))]
@@ -130,30 +123,6 @@ def removals(keys: Path) -> dict[str, str]:
     return {name: effect for (effect, _), (_, name) in sorted(found.items())}
 
 
-def _solve(out: Path, folder: str, jobs: Mapping[str, tuple[Any, ...]], workers: int, progress: Progress,
-           solver: Callable[..., dict[str, Any]] | None = None) -> None:
-    """Answers to the cases of `jobs`, whose values the solver (`solve`) is told beside the records, into a folder."""
-    solver = solver or solve
-    answers, names = out / folder, list(jobs)
-    answers.mkdir(exist_ok=True)
-    left = [name for name in names if not (answers / f"{name}.json").is_file()]
-    with closed(out / "keys"), ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        running = {pool.submit(solver, out / "records" / name, *jobs[name]): name for name in left}
-        for k, task in enumerate(as_completed(running), start=len(names) - len(left) + 1):
-            write_text(answers / f"{running[task]}.json", json.dumps(task.result(), allow_nan=False))
-            progress(f"{folder}: {k} of {len(names)}")
-
-
-@contextmanager
-def closed(folder: Path) -> Iterator[None]:
-    """No permission to read `folder` while the context lasts (which does not hold the system's administrator)."""
-    folder.chmod(0)
-    try:
-        yield
-    finally:
-        folder.chmod(OPEN)
-
-
 def solve(case: Path, without: tuple[str, ...] = ()) -> dict[str, Any]:
     """The diagnosis of one case's records, as `icing diagnose --json` prints it, some effects left out of the library.
 
@@ -161,14 +130,10 @@ def solve(case: Path, without: tuple[str, ...] = ()) -> dict[str, Any]:
     counted as failed.
     """
     from icing_env.record import read
-    from sim2real.diagnosis import diagnose
-    from testbed.commands.common import plain
-    from testbed.commands.diagnose import answer
 
     def work() -> dict[str, Any]:
         records = [read(path) for path in sorted(case.glob("*.csv"))]
-        told: dict[str, Any] = plain(answer(diagnose(records[:DIAGNOSED], records[DIAGNOSED:], without=without)))
-        return told
+        return diagnosis_of(records[:DIAGNOSED], records[DIAGNOSED:], without=without)
 
     return answered(work)
 
@@ -179,16 +144,6 @@ def solve_by(case: Path, rival: str) -> dict[str, Any]:
     from testbed.rivals.solve import diagnose
 
     return answered(lambda: diagnose(rival, [read(path) for path in sorted(case.glob("*.csv"))[:DIAGNOSED]]))
-
-
-def answered(work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """One case's answer; where a record is refused or `work` fails, why: it must not cost other cases their answers."""
-    try:
-        return work()
-    except InputError as error:
-        return {"error": str(error)}
-    except Exception as error:
-        return {"error": f"{type(error).__name__}: {error}"}
 
 
 def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[str]]]]:

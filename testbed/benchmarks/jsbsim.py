@@ -1,20 +1,19 @@
 """Another simulator as the aircraft: JSBSim's DHC-6 with a change, diagnosed against its own clean flights.
 
-Records are drawn and flown by testbed.withheld; workers that diagnose get paths of records and nothing else. What is
-there already is kept, so that an interrupted run goes on.
+Records are drawn and flown by testbed.withheld, and answered without their keys (`answers`). What is there already is
+kept, so that an interrupted run goes on.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from icing_env.errors import InputError
-from testbed.benchmarks.diagnosis import OPEN, answered, closed
+from testbed.benchmarks.answers import OPEN, Progress, answer_all, answered, diagnosis_of
 from testbed.withheld.files import read_json, write_text
 from testbed.withheld.jsbsim_cases import Design, designs, write_case
 from testbed.withheld.jsbsim_edit import data_root
@@ -23,7 +22,6 @@ from testbed.withheld.jsbsim_tables import differences, differing
 from testbed.workers import a_core_each
 
 CASES = 16
-Progress = Callable[[str], None]
 
 
 @a_core_each()
@@ -48,7 +46,7 @@ def measure(out: Path, cases: int | None, seed: int, workers: int, root: str | N
         raise InputError(f"{where}: pip install jsbsim, or name a JSBSim tree by --jsbsim-root or JSBSIM_ROOT")
     drawn = designs(cases or CASES, seed)
     _fly(out, drawn, seed, found, workers, progress)
-    _solve(out, [design.name for design in drawn], workers, progress)
+    answer_all(out, "answers", {design.name: () for design in drawn}, workers, progress, solve)
     progress("scoring")
     apart = differences(found)
     result = score(out / "answers", out / "keys", differing(apart))
@@ -58,7 +56,7 @@ def measure(out: Path, cases: int | None, seed: int, workers: int, root: str | N
 
 def _fly(out: Path, drawn: list[Design], seed: int, root: Path, workers: int, progress: Progress) -> None:
     records, keys, told = out / "records", out / "keys", out / "set.json"
-    for folder in (records, keys, out / "answers"):
+    for folder in (records, keys):
         folder.mkdir(parents=True, exist_ok=True)
     keys.chmod(OPEN)
     mine = {"cases": len(drawn), "seed": seed}
@@ -72,28 +70,14 @@ def _fly(out: Path, drawn: list[Design], seed: int, root: Path, workers: int, pr
             progress(f"flown {k} of {len(drawn)}")
 
 
-def _solve(out: Path, names: list[str], workers: int, progress: Progress) -> None:
-    answers = out / "answers"
-    left = [name for name in names if not (answers / f"{name}.json").is_file()]
-    with closed(out / "keys"), ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        running = {pool.submit(solve, out / "records" / name): name for name in left}
-        for k, task in enumerate(as_completed(running), start=len(names) - len(left) + 1):
-            write_text(answers / f"{running[task]}.json", json.dumps(task.result(), allow_nan=False))
-            progress(f"diagnosed {k} of {len(names)}")
-
-
 def solve(case: Path) -> dict[str, Any]:
     """The diagnosis of one case, as `icing diagnose --json` prints it; {"error": why} where there is none."""
     from icing_env.record import read
-    from sim2real.diagnosis import diagnose
-    from testbed.commands.common import plain
-    from testbed.commands.diagnose import answer
 
     def work() -> dict[str, Any]:
         records = [read(path) for path in sorted(case.glob("*.csv"))]
         of = {role: [r for r in records if r.meta.role == role] for role in ("diagnose", "held_out", "reference")}
-        told: dict[str, Any] = plain(answer(diagnose(of["diagnose"], of["held_out"], of["reference"])))
-        return told
+        return diagnosis_of(of["diagnose"], of["held_out"], of["reference"])
 
     return answered(work)
 

@@ -1,0 +1,70 @@
+"""Let a solver answer the cases of a set: in processes that are told paths of records and nothing else.
+
+The key folder is closed to reading meanwhile. Every answer is written as soon as it is there, so that an interrupted
+run goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from icing_env.errors import InputError
+from icing_env.record import FlightRecord
+from testbed.withheld.files import write_text
+
+OPEN = 0o700  # of the key folder outside the diagnosis
+Progress = Callable[[str], None]
+
+
+def answer_all(out: Path, folder: str, jobs: Mapping[str, tuple[Any, ...]], workers: int, progress: Progress,
+               solver: Callable[..., dict[str, Any]]) -> None:  # fmt: skip
+    """Answers to the cases of `jobs`, whose values the solver is told beside the records, into a folder of `out`.
+
+    Args:
+        solver: of the folder of a case's records and what the job holds; it runs in another process.
+    """
+    answers, names = out / folder, list(jobs)
+    answers.mkdir(parents=True, exist_ok=True)
+    left = [name for name in names if not (answers / f"{name}.json").is_file()]
+    with closed(out / "keys"), ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        running = {pool.submit(solver, out / "records" / name, *jobs[name]): name for name in left}
+        for k, task in enumerate(as_completed(running), start=len(names) - len(left) + 1):
+            write_text(answers / f"{running[task]}.json", json.dumps(task.result(), allow_nan=False))
+            progress(f"{folder}: {k} of {len(names)}")
+
+
+@contextmanager
+def closed(folder: Path) -> Iterator[None]:
+    """No permission to read `folder` while the context lasts (which does not hold the system's administrator)."""
+    folder.chmod(0)
+    try:
+        yield
+    finally:
+        folder.chmod(OPEN)
+
+
+def diagnosis_of(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] = (),
+                 references: Sequence[FlightRecord] = (), without: tuple[str, ...] = ()) -> dict[str, Any]:  # fmt: skip
+    """What `icing diagnose --json` prints of these records, some effects left out of the library."""
+    from sim2real.diagnosis import diagnose
+    from testbed.commands.common import plain
+    from testbed.commands.diagnose import answer
+
+    told: dict[str, Any] = plain(answer(diagnose(records, held_out, references, without=without)))
+    return told
+
+
+def answered(work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """One case's answer; where a record is refused or `work` fails, why: it must not cost other cases their answers."""
+    try:
+        return work()
+    except InputError as error:
+        return {"error": str(error)}
+    except Exception as error:
+        return {"error": f"{type(error).__name__}: {error}"}
