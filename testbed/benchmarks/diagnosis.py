@@ -45,7 +45,7 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
     Raises:
         InputError: `out` holds another set, or its files are not those of its manifest.
     """
-    committed = _drawn(out, cases, seed, workers, progress)
+    committed = drawn(out, cases, seed, workers, progress)
     if ledger is not None:
         enter_draw(ledger, kind_of(committed), committed, out)
     names = sorted(committed["cases"])
@@ -70,7 +70,12 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
     return found
 
 
-def _drawn(out: Path, cases: int, seed: int | None, workers: int, progress: Progress) -> dict[str, Any]:
+def drawn(out: Path, cases: int, seed: int | None, workers: int, progress: Progress) -> dict[str, Any]:
+    """Draw a set in `out`, or finish it; its manifest, and `sources`, the hash of what will answer it.
+
+    Raises:
+        InputError: `out` holds another set, or its files are not those of its manifest.
+    """
     from icing_env.jit import source_hash
 
     if (out / "keys").is_dir():

@@ -1,7 +1,7 @@
 """`icing benchmark`: how fast (`speed`), how well ice (`characterisation`) and gaps (`diagnosis`) are told.
 
 `protection`, `adaptation`: what they are worth; `policies`: what a gap does to a choice between controllers;
-`real_flight`: recorded flights diagnosed.
+`real_flight`: recorded flights diagnosed; `recordings`: the same flights as other recorders would have them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from icing_env.errors import InputError, nearest
 from testbed.commands.common import print_json, print_table, verb
 
 NAMES = ("speed", "characterisation", "protection", "adaptation", "diagnosis", "real_flight",
-         "policies")
+         "policies", "recordings")
 EXAMPLE = """icing benchmark speed --json
 icing benchmark characterisation --quick --figure out/reliability.png
 icing benchmark protection --encounters 200 --json
@@ -31,11 +31,13 @@ icing benchmark diagnosis --jsbsim"""
 @click.option("--weights", type=click.Path(path_type=Path), help="characterisation: folder of a training.")
 @click.option("--figure", type=click.Path(path_type=Path), help="characterisation: reliability curves as PNG.")
 @click.option("--encounters", type=click.IntRange(min=2), help="protection: encounters per row; 1000 if omitted.")
-@click.option("--only", metavar="A,B,...", help="protection: rows, real_flight, policies: cases; of these only.")
-@click.option("--cases", type=click.IntRange(min=8), help="diagnosis: how many; 2400 if omitted, 150 with --quick.")
+@click.option("--only", metavar="A,B,...",
+              help="of these only. protection: rows; real_flight, policies: cases; recordings: recorders.")
+@click.option("--cases", type=click.IntRange(min=8),
+              help="how many. diagnosis: 2400 if omitted, 150 with --quick; recordings: 24, 8.")
 @click.option("--fresh-seed", is_flag=True, help="diagnosis: a sealed set, its seed from the operating system.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/withheld"),
-              show_default=True, help="diagnosis: records, keys, answers; an interrupted run goes on from there.")
+              show_default=True, help="records, keys, answers of diagnosis, recordings; an interrupted run goes on.")
 @click.option("--pool", multiple=True, type=click.Path(path_type=Path),
               help="diagnosis: draw and solve nothing, score these sets together: --out folders or --publish files.")
 @click.option("--publish", type=click.Path(path_type=Path, dir_okay=False),
@@ -46,7 +48,8 @@ icing benchmark diagnosis --jsbsim"""
               help="diagnosis: append to that file what was drawn, and then its figures.")
 @click.option("--without", is_flag=True, help="diagnosis: also each effect in turn left out of the library.")
 @click.option("--rivals", is_flag=True, help="diagnosis: diagnoses of other kinds answer too, as baselines.")
-@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="diagnosis: processes.")
+@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True,
+              help="diagnosis, recordings: processes.")
 def command(name: str, quick: bool, weights: Path | None, figure: Path | None, encounters: int | None,
             only: str | None, cases: int | None, fresh_seed: bool, out: Path, ledger: Path | None, workers: int,
             without: bool, rivals: bool, pool: tuple[Path, ...], publish: Path | None, jsbsim: bool,
@@ -59,8 +62,9 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
     autopilot stalls or departs, unprotected, with every protection and with the true ice known; nuisance in clear air;
     the time that a protection takes. `adaptation`: flying qualities of iced aircraft with the control laws adapted,
     against the clean aircraft's. `diagnosis`: gaps drawn and flown by a plant of the benchmark's own, half of them in
-    another form than the library's, some in no library; the solver does not see the keys. Seeds are fixed in the code,
-    apart from those of the training; --seed changes nothing but the set of `diagnosis`.
+    another form than the library's, some in no library; the solver does not see the keys. `recordings`: some of these
+    flights as other recorders would have them, slower, on fewer levels, with holes, in part. Seeds are fixed in the
+    code, apart from those of the training; --seed changes nothing but the sets of these two.
     """
     if name == "speed":
         _speed(as_json)
@@ -86,6 +90,9 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
     if name in ("real_flight", "policies"):
         _cases(name, only, as_json)
         return
+    if name == "recordings":
+        _recordings(cases or (8 if quick else None), only, seed, out / "recordings", workers, as_json)
+        return
     from testbed.characterisation.benchmark import draw, measure, tables
 
     found = measure(quick, weights, lambda what: click.echo(f"{what} ...", err=True))
@@ -98,8 +105,7 @@ def _cases(name: str, only: str | None, as_json: bool) -> None:
     from importlib import import_module
 
     study = import_module(f"testbed.benchmarks.{name}")
-    chosen = [case.strip() for case in only.split(",")] if only else []
-    found = study.measure(chosen, lambda what: click.echo(f"{what} ...", err=True))
+    found = study.measure(_listed(only), lambda what: click.echo(f"{what} ...", err=True))
     if as_json:
         print_json(found)
         return
@@ -108,6 +114,17 @@ def _cases(name: str, only: str | None, as_json: bool) -> None:
         for sentence in case.sentences:
             click.echo(sentence)
         click.echo()
+
+
+def _recordings(cases: int | None, only: str | None, seed: int, out: Path, workers: int, as_json: bool) -> None:
+    from testbed.benchmarks.recordings import measure, tables
+
+    found = measure(out, cases, seed, workers, _listed(only), lambda what: click.echo(what, err=True))
+    _show(found, tables(found), as_json)
+
+
+def _listed(only: str | None) -> list[str]:
+    return [name.strip() for name in only.split(",")] if only else []
 
 
 def _adaptation(quick: bool, as_json: bool) -> None:
@@ -153,7 +170,7 @@ def _jsbsim(cases: int | None, seed: int, out: Path, workers: int, root: str | N
 def _protection(quick: bool, encounters: int | None, only: str | None, as_json: bool) -> None:
     from testbed.benchmarks.protection import WHO, measure, tables
 
-    names = tuple(name.strip() for name in only.split(",")) if only else ()
+    names = tuple(_listed(only))
     for name in names:
         if name not in WHO:
             raise InputError(f"no row '{name}' of the protection benchmark: {nearest(name, list(WHO))}")
