@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from icing_env import record
-from testbed.withheld import draw, effects, files, flights, generate, separation, unknown
+from testbed.withheld import draw, effects, files, flights, generate, separation, strangers, unknown
 from testbed.withheld.manoeuvres import PLANS
 from testbed.withheld.numbers import airframe
 from testbed.withheld.shadow import shadow
@@ -44,6 +44,16 @@ def test_tiers_gusts_forms_and_effects_are_all_drawn():
     assert abs(spread.mean() - 1.0) < 0.005 and 0.045 < spread.std() < 0.055
 
 
+def test_strangers_are_drawn_alone_each_in_turn_at_every_gust_and_are_in_no_other_list():
+    names = {e.name for e in strangers.STRANGERS}
+    assert len(names) == len(strangers.STRANGERS) and not names & (set(effects.BY_NAME) | set(unknown.BY_NAME))
+    drawn = draw.stranger_designs(3 * len(names), 1)
+    assert {d.tier for d in drawn} == {"unknown"}
+    assert {(d.parts[0][0], d.sigma) for d in drawn} == {(n, s) for n in names for s in draw.SIGMAS}
+    assert not names & {d.parts[0][0] for d in draw.designs(2400, 1) if d.parts}
+    assert draw.stranger_designs(20, 5) == draw.stranger_designs(20, 5) != draw.stranger_designs(20, 6)
+
+
 def test_sizes_stay_within_what_the_protocol_allows():
     drawn = [part for d in draw.designs(2400, 1) if d.tier == "single" for part in d.parts]
     ratios = [abs(size / effects.BY_NAME[name].typical) for name, _, size in drawn]
@@ -68,7 +78,8 @@ def test_a_case_without_effects_is_the_published_aircraft_and_its_spread():
     assert len(texts) == 2 * len(PLANS[0])
 
 
-@pytest.mark.parametrize("pool", [effects.EFFECTS, unknown.UNKNOWN], ids=["library", "unknown"])
+@pytest.mark.parametrize("pool", [effects.EFFECTS, unknown.UNKNOWN, strangers.STRANGERS],
+                         ids=["library", "unknown", "strangers"])
 def test_every_effect_does_something_in_each_of_its_forms(pool, shape):
     for effect in pool:
         for form in ("same", "other") if effect.same is not effect.other else ("same",):
@@ -165,6 +176,9 @@ def test_names_of_a_sealed_set_are_random_and_in_no_order(tmp_path, only_nulls):
         generate._roll(tmp_path / "a.json", 41, None)
     with pytest.raises(ValueError, match="another seed"):  # a sealed set is not finished as a development set
         generate._roll(tmp_path / "a.json", 40, 3)
+    with pytest.raises(ValueError, match="another seed"):  # nor as one of strangers
+        generate._roll(tmp_path / "a.json", 40, None, strangers=True)
+    assert len(generate._roll(tmp_path / "c.json", 40, None, strangers=True)[0]) == 40
 
 
 def test_an_interrupted_draw_goes_on_and_tampering_is_told(tmp_path, only_nulls):

@@ -22,13 +22,13 @@ from testbed.withheld.refly import refly
 from testbed.withheld.score import DETECTABLE, identifiable, score
 from testbed.workers import a_core_each
 
-QUICK, FULL = 150, 2400
+QUICK, FULL, STRANGERS = 150, 2400, 40
 
 
 @a_core_each()
 def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Progress,
             without: bool = False, rivals: bool = False, ledger: Path | None = None,
-            published: Path | None = None) -> dict[str, Any]:
+            published: Path | None = None, strangers: bool = False) -> dict[str, Any]:
     """Draw (or finish drawing) a set in `out`, diagnose every case, fly the answers again, score.
 
     Args:
@@ -41,11 +41,12 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
         rivals: let every rival (`testbed.rivals`) answer too, into `answers_NAME`; what stands there is scored anyway.
         ledger: file that is told, by a line each, of the set once it is drawn and of its figures.
         published: file that the set is published in once it is scored (`published_sets`).
+        strangers: draw effects of the second list of unknown ones alone (`testbed.withheld.strangers`).
 
     Raises:
         InputError: `out` holds another set, or its files are not those of its manifest.
     """
-    committed = drawn(out, cases, seed, workers, progress)
+    committed = drawn(out, cases, seed, workers, progress, strangers)
     if ledger is not None:
         enter_draw(ledger, kind_of(committed), committed, out)
     names = sorted(committed["cases"])
@@ -70,7 +71,8 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
     return found
 
 
-def drawn(out: Path, cases: int, seed: int | None, workers: int, progress: Progress) -> dict[str, Any]:
+def drawn(out: Path, cases: int, seed: int | None, workers: int, progress: Progress,
+          strangers: bool = False) -> dict[str, Any]:
     """Draw a set in `out`, or finish it; its manifest, and `sources`, the hash of what will answer it.
 
     Raises:
@@ -83,12 +85,13 @@ def drawn(out: Path, cases: int, seed: int | None, workers: int, progress: Progr
     if (out / "manifest.json").is_file():
         committed = read_json(out / "manifest.json")
         wanted = None if seed is None else DEVELOPMENT_SEED + seed
-        if committed["count"] != cases or committed["development_seed"] != wanted:
+        if (committed["count"], committed["development_seed"], "strangers" in committed) != (cases, wanted, strangers):
             raise InputError(f"{out}: holds a {kind_of(committed)} set of {committed['count']} cases, "
                              "not the one asked for; give another --out")
     else:
         try:
-            committed = generate(out, cases, None if seed is None else DEVELOPMENT_SEED + seed, workers, progress)
+            committed = generate(out, cases, None if seed is None else DEVELOPMENT_SEED + seed, workers, progress,
+                                 strangers)
         except ValueError as error:
             raise InputError(f"{error}; give another --out") from error
     untouched(out, committed)

@@ -48,11 +48,12 @@ icing benchmark diagnosis --jsbsim"""
               help="diagnosis: append to that file what was drawn, and then its figures.")
 @click.option("--without", is_flag=True, help="diagnosis: also each effect in turn left out of the library.")
 @click.option("--rivals", is_flag=True, help="diagnosis: diagnoses of other kinds answer too, as baselines.")
+@click.option("--strangers", is_flag=True, help="diagnosis: only effects that nobody had in mind; 40 if not told.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True,
               help="diagnosis, recordings: processes.")
 def command(name: str, quick: bool, weights: Path | None, figure: Path | None, encounters: int | None,
             only: str | None, cases: int | None, fresh_seed: bool, out: Path, ledger: Path | None, workers: int,
-            without: bool, rivals: bool, pool: tuple[Path, ...], publish: Path | None, jsbsim: bool,
+            without: bool, rivals: bool, strangers: bool, pool: tuple[Path, ...], publish: Path | None, jsbsim: bool,
             jsbsim_root: str | None, as_json: bool, seed: int) -> None:
     """Measure the testbed.
 
@@ -85,7 +86,11 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
         _pooled(pool, as_json)
         return
     if name == "diagnosis":
-        _diagnosis(quick, cases, None if fresh_seed else seed, out, ledger, publish, workers, without, rivals, as_json)
+        from testbed.benchmarks.diagnosis import FULL, QUICK, STRANGERS
+
+        _diagnosis(cases or (STRANGERS if strangers else QUICK if quick else FULL), None if fresh_seed else seed,
+                   out / "strangers" if strangers else out, workers, as_json, without=without, rivals=rivals,
+                   ledger=ledger, published=publish, strangers=strangers)
         return
     if name in ("real_flight", "policies"):
         _cases(name, only, as_json)
@@ -134,12 +139,10 @@ def _adaptation(quick: bool, as_json: bool) -> None:
     _show(found, tables(found), as_json)
 
 
-def _diagnosis(quick: bool, cases: int | None, seed: int | None, out: Path, ledger: Path | None,
-               publish: Path | None, workers: int, without: bool, rivals: bool, as_json: bool) -> None:
-    from testbed.benchmarks.diagnosis import FULL, QUICK, measure, tables
+def _diagnosis(cases: int, seed: int | None, out: Path, workers: int, as_json: bool, **options: Any) -> None:
+    from testbed.benchmarks.diagnosis import measure, tables
 
-    found = measure(out, cases or (QUICK if quick else FULL), seed, workers, lambda what: click.echo(what, err=True),
-                    without, rivals, ledger, publish)
+    found = measure(out, cases, seed, workers, lambda what: click.echo(what, err=True), **options)
     _show(found, tables(found), as_json)
 
 

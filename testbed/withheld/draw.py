@@ -9,6 +9,7 @@ import numpy as np
 from testbed.withheld.effects import EFFECTS, Effect
 from testbed.withheld.manoeuvres import PLANS
 from testbed.withheld.numbers import DERIVATIVES
+from testbed.withheld.strangers import STRANGERS
 from testbed.withheld.unknown import UNKNOWN
 
 DEVELOPMENT_SEED = 20_260_214  # sets that one may look at while writing a solver; sets for reports take the system's
@@ -81,6 +82,19 @@ def designs(count: int, seed: int) -> list[Design]:
             found.append(Design(tier, parts, *conditions(SIGMAS[k % 3], rng), published_spread(rng),
                                 int(rng.integers(2**62)), _target(rng) if tier == "unknown" else 0.0))
     return [found[i] for i in rng.permutation(len(found))]
+
+
+def stranger_designs(count: int, seed: int) -> list[Design]:
+    """`count` cases of the second list of unknown effects (`strangers.py`), each in turn, at every gust level."""
+    rng = np.random.default_rng(np.random.SeedSequence([seed, count, 4]))
+    order = rng.permutation(len(STRANGERS))
+    found = []
+    for k in range(count):
+        chosen = STRANGERS[int(order[k % len(order)])]
+        sigma = SIGMAS[(k % len(order) + k // len(order)) % 3]
+        found.append(Design("unknown", ((chosen.name, "same", size_of(chosen, rng)),), *conditions(sigma, rng),
+                            published_spread(rng), int(rng.integers(2**62)), _target(rng)))
+    return [found[i] for i in rng.permutation(count)]
 
 
 def conditions(sigma: float, rng: np.random.Generator) -> tuple[int, float, float, float, float]:

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from testbed.withheld import effects, gusts, instruments, manoeuvres, trim, unknown
+from testbed.withheld import effects, gusts, instruments, manoeuvres, strangers, trim, unknown
 from testbed.withheld import plant as pl
 from testbed.withheld.numbers import DTYPE, KNOBS, PUBLISHED, SENSOR_KNOBS, airframe
 
-CATALOGUE = {**effects.BY_NAME, **unknown.BY_NAME}
+CATALOGUE = {**effects.BY_NAME, **unknown.BY_NAME, **strangers.BY_NAME}
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from testbed.withheld import files, numbers
-from testbed.withheld.draw import Design, designs
+from testbed.withheld.draw import Design, designs, stranger_designs
 from testbed.withheld.faults import excused, fault_count, fault_designs, spoiled
 from testbed.withheld.flights import CATALOGUE, Aircraft, recorded
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
@@ -36,7 +36,7 @@ T = TypeVar("T")
 
 
 def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
-             progress: Callable[[str], None] = lambda text: None) -> dict[str, Any]:
+             progress: Callable[[str], None] = lambda text: None, strangers: bool = False) -> dict[str, Any]:
     """Make (or finish, or draw again beside its keys) a sealed set in `out`: `records/`, `keys/`, `manifest.json`.
 
     Args:
@@ -45,6 +45,7 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
         seed: for development; from the operating system if omitted.
         workers: processes.
         progress: told after every group of cases.
+        strangers: of effects of the second list alone (`strangers.py`), without faults.
 
     Returns:
         The manifest.
@@ -55,8 +56,8 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
     records, keys = out / "records", out / "keys"
     for folder in (records, keys):
         folder.mkdir(parents=True, exist_ok=True)
-    names, seed, known = _roll(keys / "seed.json", cases, seed)
-    drawn = [*designs(cases, seed), *fault_designs(cases, seed)]
+    names, seed, known = _roll(keys / "seed.json", cases, seed, strangers)
+    drawn = stranger_designs(cases, seed) if strangers else [*designs(cases, seed), *fault_designs(cases, seed)]
     jobs = [(name, design) for name, design in zip(names, drawn, strict=True)
             if not ((records / name).is_dir() and (keys / f"{name}.json").is_file())]
     groups = [list(group) for _, group in groupby(sorted(jobs, key=lambda job: bank_of(job[1])),
@@ -72,29 +73,32 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
                 done += made
                 progress(f"flown {done} of {len(drawn)}")
     sealed = files.manifest(records, keys, names) | {
-        "numbers": numbers.digest(), "count": cases, "development_seed": seed if known else None}
+        "numbers": numbers.digest(), "count": cases, "development_seed": seed if known else None} | (
+        {"strangers": True} if strangers else {})
     if (out / "manifest.json").is_file() and files.read_json(out / "manifest.json") != sealed:
         raise ValueError(f"{out}: what was drawn is not what its manifest tells: another generator, or other versions")
     files.write_text(out / "manifest.json", json.dumps(sealed, indent=1))
     return sealed
 
 
-def _roll(path: Path, cases: int, seed: int | None) -> tuple[list[str], int, bool]:
+def _roll(path: Path, cases: int, seed: int | None, strangers: bool = False) -> tuple[list[str], int, bool]:
     """Names and seed of the set and whether it was given; kept with the keys: an interrupted draw goes on as begun."""
     if path.is_file():
         kept = files.read_json(path)
-        if kept["cases"] != cases or kept["given"] != (seed is not None) or (kept["given"] and kept["seed"] != seed):
+        wanted = (cases, seed is not None, kept["seed"] if seed is None else seed, strangers)
+        if (kept["cases"], kept["given"], kept["seed"], kept.get("strangers", False)) != wanted:
             raise ValueError(f"{path.parent.parent} holds a set of {kept['cases']} cases with another seed or number")
         return kept["names"], kept["seed"], kept["given"]
     given = seed is not None
     seed = seed if seed is not None else secrets.randbits(120)
     rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
     names: list[str] = []
-    while len(names) < cases + fault_count(cases):
+    while len(names) < cases + (0 if strangers else fault_count(cases)):
         name = rng.bytes(5).hex() if given else secrets.token_hex(5)
         if name not in names:
             names.append(name)
-    files.write_text(path, json.dumps({"cases": cases, "seed": seed, "given": given, "names": names}))
+    files.write_text(path, json.dumps({"cases": cases, "seed": seed, "given": given, "names": names,
+                                      "strangers": strangers}))
     return names, seed, given
 
 

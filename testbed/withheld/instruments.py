@@ -77,6 +77,8 @@ def vanes(Y: NDArray, seen: NDArray, s: Mapping[str, float]) -> tuple[NDArray, N
     if s.get("vane_second"):
         hertz = 0.7 * 2.0 / (2.0 * math.pi * s["vane_second"])  # delay 2 zeta/w
         alpha, beta = oscillator(alpha, hertz, 0.7), oscillator(beta, hertz, 0.7)
+    alpha = sticking(alpha + _upwash(Y, seen, s), s.get("stuck_alpha", 0.0))
+    beta = (1.0 + s.get("scale_beta", 0.0)) * beta
     shaken = seen[:, pl.FZ] + n["gravity_sea_level"]
     boom = (n["boom_gain"] + s.get("boom_extra", 0.0)) * oscillator(shaken, n["boom_frequency"], n["boom_damping"])
     if s.get("boom_other"):
@@ -85,11 +87,29 @@ def vanes(Y: NDArray, seen: NDArray, s: Mapping[str, float]) -> tuple[NDArray, N
     return low(alpha + boom, recorder), low(beta, recorder)
 
 
+def sticking(x: NDArray, grip: float) -> NDArray:
+    """What a vane shows that does not move before the flow has turned by `grip`, and then follows it."""
+    out = x.copy()
+    for k in range(1, len(x) if grip > 0.0 else 0):
+        out[k] = x[k] if abs(x[k] - out[k - 1]) > grip else out[k - 1]
+    return out
+
+
+def _upwash(Y: NDArray, seen: NDArray, s: Mapping[str, float]) -> NDArray | float:
+    """Angle at the vane that goes with the thrust coefficient."""
+    if not s.get("power_alpha"):
+        return 0.0
+    density = geopotential_pressure(Y[:, pl.H]) / (R_AIR * (288.15 - 0.0065 * Y[:, pl.H]))
+    dynamic = 0.5 * density * seen[:, pl.VT] ** 2 * PUBLISHED["wing_area"]
+    return np.asarray(s["power_alpha"] * ((seen[:, pl.TL] + seen[:, pl.TR]) / dynamic - PUBLISHED["CT_reference"]))
+
+
 def exact(Y: NDArray, seen: NDArray, s: Mapping[str, float], start: float = 0.0) -> dict[str, NDArray]:
     """Every channel of FAST and SLOW, samples from `start` s on, without noise, instruments wrong as `s` says."""
     recorder = 1.0 - math.exp(-2.0 * math.pi * PUBLISHED["filter_frequency"] * pl.DT)
     t = start + np.arange(len(Y)) * pl.DT
     speed = seen[:, pl.VT] * (1.0 + s.get("airspeed_alpha", 0.0) * seen[:, pl.ALPHA])
+    speed = speed * (1.0 - s.get("sideslip_airspeed", 0.0) * seen[:, pl.BETA] ** 2)
     speed = np.sqrt(np.maximum(speed**2 + 2.0 * s.get("pressure_airspeed", 0.0) * 72.0**2, 1.0))
     c = {"airspeed": (1.0 + s.get("scale_airspeed", 0.0)) * low(speed, gain(PUBLISHED["pitot_lag"]))}
     c["alpha"], c["beta"] = vanes(Y, seen, s)
@@ -99,10 +119,12 @@ def exact(Y: NDArray, seen: NDArray, s: Mapping[str, float], start: float = 0.0)
            "aileron": Y[:, pl.DA], "rudder": Y[:, pl.DR]}  # fmt: skip
     if s.get("flexible_az"):
         raw["az"] = raw["az"] + s["flexible_az"] * (oscillator(raw["az"], 3.2, 0.08) - raw["az"])
+    raw["az"] = raw["az"] + s.get("square_az", 0.0) * (raw["az"] + G0) ** 2
+    raw["p"] = (1.0 + s.get("scale_p", 0.0)) * raw["p"]
     raw["q"] = raw["q"] + s.get("gyro_g", 0.0) * (raw["az"] + G0) + s.get("gyro_cross", 0.0) * Y[:, pl.P]
     c |= {name: low(x, recorder) for name, x in raw.items()}
-    c |= {"phi": Y[:, pl.PHI], "theta": Y[:, pl.THETA] + s.get("attitude_cross", 0.0) * Y[:, pl.PHI],
-          "psi": Y[:, pl.PSI]}  # fmt: skip
+    c |= {"phi": (1.0 + s.get("scale_phi", 0.0)) * Y[:, pl.PHI],
+          "theta": Y[:, pl.THETA] + s.get("attitude_cross", 0.0) * Y[:, pl.PHI], "psi": Y[:, pl.PSI]}  # fmt: skip
     for name in ("alpha", "beta", "q", "theta", "ax", "az"):
         wander = s.get(f"wander_{name}", 0.0)
         c[name] = c[name] + s.get(f"bias_{name}", 0.0) + wander * (1.0 + 0.15 * np.sin(2.0 * math.pi * t / 55.0))

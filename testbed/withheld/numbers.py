@@ -38,14 +38,19 @@ KNOBS = (
     # effects that are in no library
     "Cm_aileron", "Cm_beta2", "Cm_alpha3", "fin_ct", "slosh_mass", "elevator_play", "Cn_betadot", "Cl_torque",
     "Cn_pfactor", "blowback", "Cn_alpha_aileron", "gyroscopic", "CZ_alphadot", "aileron_dead", "elevator_delay",
-    "Cm_rotor_wake", "CY_alpha_rudder", "brake_drag")  # fmt: skip
+    "Cm_rotor_wake", "CY_alpha_rudder", "brake_drag",
+    # strangers, in no list until a solver was done (`strangers.py`)
+    "CD_beta2", "CZ_beta2", "Cm_alpha_q", "Cl_alpha_p", "CZ_ct_alpha", "Cl_wave", "loose_load", "rudder_one_sided",
+    "rudder_of_aileron")  # fmt: skip
 SENSOR_KNOBS = (
     "bias_alpha", "bias_beta", "bias_q", "bias_theta", "bias_ax", "bias_az",
     "wander_alpha", "wander_beta", "wander_q", "wander_theta", "wander_ax", "wander_az",  # bias that changes in time
     "scale_alpha", "scale_alpha2", "scale_airspeed", "pressure_airspeed", "vane_extra", "vane_second",
     "vane_error", "vane_cross", "boom_extra", "boom_other",
     # in no library
-    "flexible_az", "gyro_g", "gyro_cross", "attitude_cross", "airspeed_alpha")  # fmt: skip
+    "flexible_az", "gyro_g", "gyro_cross", "attitude_cross", "airspeed_alpha",
+    # strangers
+    "stuck_alpha", "square_az", "scale_p", "scale_phi", "scale_beta", "sideslip_airspeed", "power_alpha")  # fmt: skip
 
 
 def folder() -> Path:

@@ -115,10 +115,11 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     xr = p.CX_0 + p.CX_0_right + (1.0 - right) * axial
     zw = 0.5 * (zl + zr)
     drag = p.CD_parasite + p.CD_alpha * (a / 0.06) ** 2 + p.CD_lift * zw * zw + p.brake_drag * abs(dr)
+    drag += p.CD_beta2 * b * b
     adot = (a - y[ALAG]) / 0.05
     cx = 0.5 * (xl + xr) - drag * ca
     cz = (zw - drag * sa + p.CZ_q * qh + p.CZ_elevator * de + p.CZ_CT * ct
-          + p.CZ_alphadot * adot * p.chord / (2.0 * V_))  # fmt: skip
+          + p.CZ_alphadot * adot * p.chord / (2.0 * V_) + p.CZ_beta2 * b * b + p.CZ_ct_alpha * ct * a)  # fmt: skip
 
     # tail
     arrival = (g[2] - g[3]) / V_
@@ -133,7 +134,7 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
           * (1.0 - p.tail_stall_elevator_loss * tail)
           + p.Cm_CT * ct + p.Cm_ct2 * (ct + 6.0 * ct * ct) - tail * p.Cm_alpha_tail * (at + p.alpha_tail_stall)
           + p.Cm_at_72 * fast + p.Cm_aileron * da + p.Cm_beta2 * b * b + p.Cm_alpha3 * (a - 0.03) ** 3
-          + p.Cm_rotor_wake * ct * (a - 0.03))  # fmt: skip
+          + p.Cm_rotor_wake * ct * (a - 0.03) + p.Cm_alpha_q * (a - 0.03) * qh)  # fmt: skip
 
     # lateral
     loss = 1.0 - p.damping_separated * share
@@ -143,7 +144,8 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     cl = (p.Cl_0 + p.Cl_alpha * a + p.Cl_beta * b + bounded(p.Cl_beta_soft, b, 0.25) + p.Cl_r * rh + p.Cl_rudder * dr
           + loss * (p.Cl_p * ph + bounded(p.Cl_p_soft, ph, 0.1) + p.Cl_aileron * da
                     + bounded(p.Cl_aileron_soft, da, 0.3))
-          + p.lift_arm * 0.5 * (zr - zl) + p.Cl_at_72 * fast + p.Cl_torque * ct)  # fmt: skip
+          + p.lift_arm * 0.5 * (zr - zl) + p.Cl_at_72 * fast + p.Cl_torque * ct
+          + p.Cl_alpha_p * (a - 0.03) * ph + p.Cl_wave * math.sin(2.0 * math.pi * t / 7.0))  # fmt: skip
     cn = (p.Cn_0 + fin * (p.Cn_beta * b + p.Cn_rudder * dr) + bounded(p.Cn_beta_soft, b, 0.25) + p.Cn_p * ph
           + p.Cn_r * rh + p.Cn_aileron * da + bounded(p.Cn_rudder_soft, dr, 0.25) - p.lift_arm * 0.5 * (xr - xl)
           + p.Cn_betadot * (b - y[BLAG]) / 0.1 * p.span / (2.0 * V_) + p.Cn_pfactor * a * ct
@@ -154,7 +156,8 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     slosh = p.slosh_mass * 6.0 * (y[SLOSH] - y[PHI])  # N per unit angle: assumed pendulum in the tanks
     L = qS * p.span * cl - p.cg_shift_y * Z + p.cg_shift_z * Y + p.slosh_mass * 9.8 * 2.5 * y[SLOSH]
     Y = Y + slosh
-    M = (qS * p.chord * cm - p.cg_shift_z * X + p.cg_shift_x * Z + p.engine_arm_z * thrust + p.gyroscopic * y[R])
+    M = (qS * p.chord * cm - p.cg_shift_z * X + (p.cg_shift_x + p.loose_load * y[THETA]) * Z
+         + p.engine_arm_z * thrust + p.gyroscopic * y[R])  # fmt: skip
     N = qS * p.span * cn - p.cg_shift_x * Y + p.cg_shift_y * X + p.engine_arm_y * (tl - tr) - p.gyroscopic * y[Q]
     fx, fy, fz = X / p.mass, Y / p.mass, Z / p.mass
     Ix, Iy, Iz, Ixz = p.inertia_xx, p.inertia_yy, p.inertia_zz, p.inertia_xz
@@ -178,6 +181,7 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     ta = u[1] - min(max(u[1], -p.aileron_dead), p.aileron_dead)
     ta = p.aileron_gearing * ta + p.aileron_cubic * ta * (ta / 0.1) ** 2
     tu = p.rudder_gearing * u[2] + p.rudder_cubic * u[2] * (u[2] / 0.1) ** 2
+    tu += p.rudder_one_sided * max(u[2], 0.0) + p.rudder_of_aileron * u[1]
     d[DE], d[DE1] = surface(y[DE], y[DE1], te, p.elevator_min, p.elevator_max, p.elevator_lag, p.elevator_rate,
                             p.elevator_frequency, p.elevator_soft_rate)  # fmt: skip
     d[DA], d[DA1] = surface(y[DA], y[DA1], ta, p.aileron_min, p.aileron_max, p.aileron_lag, p.aileron_rate,

@@ -1,0 +1,38 @@
+"""Effects drawn up when a solver was done, to see what it says of what nobody had in mind while it was written.
+
+`unknown.py` has such that no library holds, too, but their failures were looked at, and generic terms added for some of
+them. Whoever mends a solver by what it said of these makes them known; then it takes others. Sizes as there (assumed).
+"""
+
+from __future__ import annotations
+
+from testbed.withheld.effects import Effect, Form, plus, sense, times
+
+
+def _one(name: str, where: tuple[str, ...], typical: float, form: Form, signed: bool = True) -> Effect:
+    return Effect(name, where, "size", typical, form, form, signed)
+
+
+STRANGERS: tuple[Effect, ...] = (
+    _one("drag_of_sideslip", ("x_force",), 1.5, plus("CD_beta2"), False),  # per rad2
+    _one("lift_of_sideslip", ("z_force",), 6.0, plus("CZ_beta2")),  # per rad2: the fuselage shades the wing
+    _one("roll_of_yaw_rate", ("rolling_moment",), 0.8, times("Cl_r")),
+    _one("yaw_of_roll_rate", ("yawing_moment",), 0.8, times("Cn_p")),
+    _one("yaw_of_ailerons", ("yawing_moment",), -0.02, plus("Cn_aileron")),  # per rad
+    _one("roll_of_rudder", ("rolling_moment",), 0.02, plus("Cl_rudder")),  # per rad
+    _one("pitch_damping_at_alpha", ("pitching_moment",), -150.0, plus("Cm_alpha_q")),
+    _one("roll_damping_at_alpha", ("rolling_moment",), 4.0, plus("Cl_alpha_p")),
+    _one("lift_of_slipstream", ("z_force",), -8.0, plus("CZ_ct_alpha")),  # lift slope that grows with thrust
+    _one("wing_rock", ("rolling_moment",), 0.003, plus("Cl_wave"), False),  # every 7 s, for no reason
+    _one("loose_load", ("mass", "pitching_moment"), -0.6, plus("loose_load"), False),  # m/rad: it slides as she pitches
+    _one("rudder_one_sided", ("rudder_path",), -0.15, plus("rudder_one_sided")),  # gearing to the right alone
+    _one("rudder_of_aileron", ("rudder_path",), 0.15, plus("rudder_of_aileron")),  # a hidden interconnection
+    _one("vane_sticks", ("sensor:alpha",), 0.006, sense("stuck_alpha"), False),  # rad
+    _one("accelerometer_bends", ("sensor:az",), 0.01, sense("square_az")),  # per m/s2
+    _one("roll_gyro_scale", ("sensor:p",), 0.08, sense("scale_p")),
+    _one("bank_scale", ("sensor:phi",), 0.08, sense("scale_phi")),
+    _one("sideslip_scale", ("sensor:beta",), 0.15, sense("scale_beta")),
+    _one("airspeed_in_sideslip", ("sensor:airspeed",), 1.5, sense("sideslip_airspeed")),  # per rad2
+    _one("vane_in_slipstream", ("sensor:alpha",), 0.1, sense("power_alpha")),  # rad per thrust coefficient
+)
+BY_NAME = {effect.name: effect for effect in STRANGERS}
