@@ -9,6 +9,7 @@ import numpy as np
 
 from icing_env.record import FloatArray
 from sim2real.actuators.lateness import lateness
+from sim2real.actuators.wandering import wandering
 from sim2real.baseline.references import Baseline
 from sim2real.flown.companions import leading
 from sim2real.flown.points import Flying
@@ -18,7 +19,7 @@ from sim2real.flown.settling import departs, differ, followed, gains_with, gathe
 from sim2real.flown.steps import FARTHEST, Places
 from sim2real.library.candidates import Bank, at_few_sizes
 from sim2real.over_time.varying import varying
-from sim2real.posterior.any_course import course_fits
+from sim2real.posterior.any_course import course_fits, wander_fits
 from sim2real.posterior.any_delay import late_fits
 from sim2real.posterior.attribution import Linear, attribute, least_misfit, nuisance_mean, of_one, reduce, with_prior
 from sim2real.posterior.generic import UnknownFit
@@ -138,9 +139,10 @@ class _Weighing:
         """Weigh once more, free courses of time among what is unknown."""
         t, first = self.posterior.tempering, 1 + len(self.candidates.nuisances)
         parts = [[course.model, course.evidence.rows[:, : first - 1]] for course in self.along]
-        late = lateness(self.flights, [e.flight.parameters for e in self.evidences])
-        delays = late_fits(late, float(self.posterior.reduced[0, 0]), t)
-        self._weigh(t, [*course_fits(Courses(self.along, t), parts, self._gram()[:first, :first]), *delays])
+        rows, left = [e.flight.parameters for e in self.evidences], float(self.posterior.reduced[0, 0])
+        self._weigh(t, [*course_fits(Courses(self.along, t), parts, self._gram()[:first, :first]),
+                        *wander_fits(wandering(self.flights, rows), left, t),
+                        *late_fits(lateness(self.flights, rows), left, t)])
 
     def _weigh(self, tempering: float | None, free: Sequence[UnknownFit] = ()) -> None:
         self.quiet = dict(self.untestable)

@@ -32,7 +32,7 @@ def remainder(evidence: Evidence, target: str, size: float, seed: int = 0) -> tu
     response = flown(flight, rows, (Push(1, target, series, False),), evidence.gain, evidence.factor, keep=[1]).rows
     noise = np.random.default_rng(seed).standard_normal(response.shape) * np.any(evidence.whitened != 0.0)
     row = response + noise
-    return Remainder(row.T @ row, 1, [[row]], {}, {}), float(np.sum(response**2))
+    return Remainder(row.T @ row, 1, [[row]], {}, {}, {}), float(np.sum(response**2))
 
 
 @pytest.mark.parametrize(("target", "home", "elsewhere"), [
@@ -55,5 +55,5 @@ def test_noise_alone_gives_a_course_little(evidence):
 
 def test_a_path_has_no_courses_but_its_excess(evidence):
     left, _ = remainder(evidence, "p", 0.01)
-    held = Remainder(left.gram, left.first, left.rows, {"elevator_path": 77.0}, {})
+    held = Remainder(left.gram, left.first, left.rows, {"elevator_path": 77.0}, {}, {})
     assert Courses([Course(evidence)], 1.0).free(held, {"elevator_path"}) == 77.0

@@ -50,7 +50,7 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
         own = [term for term in terms if term.component == f"{surface}_path"]
         courses = path_courses(flight, predicted[:, 0], [term.name for term in own])
         added = [predicted[:, 0] + course for course in courses]
-        left = _believed(flight, surface, np.column_stack([predicted, *added]))
+        left = believed(flight, surface, np.column_stack([predicted, *added]))
         out.append((f"{surface}_path", left, rows + [term.row for term in own]))
     return out + _engine_residuals(flight, parameters)
 
@@ -65,7 +65,7 @@ def late_squares(flight: Reconstruction, parameters: NDArray, surface: str, dela
     predicted = answered(flight, surface, parameters)[:, 0]
     time = flight.dt * np.arange(len(predicted))
     late = np.column_stack([np.interp(time - delay, time, predicted) for delay in delays])
-    return np.asarray(np.sum(_believed(flight, surface, late)[first:] ** 2, axis=0))
+    return np.asarray(np.sum(believed(flight, surface, late)[first:] ** 2, axis=0))
 
 
 def answered(flight: Reconstruction, surface: str, parameters: NDArray) -> FloatArray:
@@ -82,7 +82,7 @@ def moves(flight: Reconstruction, surface: str) -> bool:
                 and np.isfinite(flight.positions[surface]).any())  # fmt: skip
 
 
-def _believed(flight: Reconstruction, surface: str, predicted: FloatArray) -> FloatArray:
+def believed(flight: Reconstruction, surface: str, predicted: FloatArray) -> FloatArray:
     """What is left of a surface's positions [N, rows] over its noise: sample by sample, and a delay that lasts."""
     measured = flight.positions[surface][:, None]
     left = np.where(np.isfinite(measured), measured - predicted, 0.0)

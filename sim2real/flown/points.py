@@ -15,6 +15,7 @@ from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.actuators.lateness import lateness
 from sim2real.actuators.paths import PATHS, excess, path_gram
+from sim2real.actuators.wandering import wandering
 from sim2real.baseline.references import Baseline
 from sim2real.flown.steps import (
     DIFFERENCE,
@@ -269,8 +270,10 @@ class Flying:
         gram[0, first - n : first] = gram[first - n : first, 0]
         gram[0, 0] += point.nuisances @ precision @ point.nuisances
         gram[1 : 1 + k, 1 : 1 + k] += (0.1 * SIZE_STEP) ** 2 * np.eye(k)  # sizes move by ten uncertainties
-        late = lateness(self.flights, [rows[:1] for rows in moved_to], round(SETTLE / self.flights[0].dt))
-        return Remainder(gram, first, kept, left_in, late, (*ends(fit, point), *(int(j) for j in 1 + k + point.held)))
+        settled = [rows[:1] for rows in moved_to], round(SETTLE / self.flights[0].dt)
+        late, wander = lateness(self.flights, *settled), wandering(self.flights, *settled)
+        held = *ends(fit, point), *(int(j) for j in 1 + k + point.held)
+        return Remainder(gram, first, kept, left_in, late, wander, held)
 
 
 def rows_of(flight: Reconstruction, candidates: Bank, fit: SetFit, sizes: FloatArray, steps: FloatArray,

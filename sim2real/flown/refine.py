@@ -21,7 +21,7 @@ from sim2real.flown.liberty import AtLiberty
 from sim2real.flown.other_form import Bent, flown_unknown, other_form
 from sim2real.flown.points import Flying
 from sim2real.flown.steps import Places, Point
-from sim2real.posterior.any_course import beside, with_courses
+from sim2real.posterior.any_course import beside, wander_fits, with_courses
 from sim2real.posterior.any_delay import late_fits
 from sim2real.posterior.forgiveness import forgive
 from sim2real.posterior.form import OTHER_FORM, SHARES, WORTH, Form, home, shares, with_terms
@@ -80,7 +80,7 @@ class _Search:
         self.generic: dict[int, list[UnknownFit]] = {}
         self.beginning: dict[int, FloatArray] = {}  # nuisances that sets within a flown one start from
         self.added: set[int] = set()  # proposed beside a flown one: no linear fit to correct others by
-        self.nothing = float(posterior.reduced[0, 0])
+        self.nothing = self.own_numbers = float(posterior.reduced[0, 0])
         self.noise = noise(flying.evidences, posterior.tempering)
 
     def fly(self, waiting: Iterable[int]) -> None:
@@ -130,12 +130,14 @@ class _Search:
         left = self.left[i].reduced()
         places = home(h.effects) if h.effects else {u.component for u in self.linear.courses if u.log_evidence > 0.0}
         fits = fit_unknown_left(left, self.flying.candidates)
-        late = late_fits(self.left[i].late, float(left[0, 0]), self.flying.tempering, home(h.effects))
-        self.generic[i] = with_courses(fits, [*beside(self.flying.courses, self.left[i], places), *late])
+        path = float(left[0, 0]), self.flying.tempering, home(h.effects)
+        self.generic[i] = with_courses(fits, [*beside(self.flying.courses, self.left[i], places),
+                                              *wander_fits(self.left[i].wander, *path),
+                                              *late_fits(self.left[i].late, *path)])
         if h.effects:
             self.found[i] = replace(h, form=self._form(i, h), instead=None)
         else:
-            self.nothing = h.fit.misfit
+            self.nothing, self.own_numbers = h.fit.misfit, self.left[i].unbounded()
 
     def _settled(self, i: int, h: Hypothesis) -> Point:
         fit, nuisances = self.places.begin(h.fit, self.beginning[i] if i in self.beginning else self.start(h))
@@ -248,15 +250,24 @@ class _Search:
         return (self.bent[i].point if i in self.bent else self.points[i]).settled
 
     def _named(self, unknown: UnknownFit, beside: Hypothesis) -> bool:
-        """Whether generic terms are another form of a single effect of the library; beside others, the like of it."""
+        """Whether generic terms are another form of a single effect of the library; beside others, the like of it.
+
+        A number of the model that is farther off than it may be is no proof of an effect that could stand in for it.
+        """
         raw = self.linear.raw
         if not beside.effects:
             linear = self.before[self.nothing_at_all()].fit.misfit  # what was not flown is compared with what was not
             return any(is_home(h, unknown, self.nothing - unknown.misfit,
-                               (self.nothing if i in self.points else linear) - h.fit.misfit, raw)
+                               self._explained(h, unknown) if i in self.points else linear - h.fit.misfit, raw)
                        for i, h in enumerate(self.found))  # fmt: skip
         return any(alike(h.fit, unknown, raw) > SHAPE for h in self.found
                    if len(h.effects) == 1 and h.unknown is None and h.effects[0] not in beside.effects)  # fmt: skip
+
+    def _explained(self, h: Hypothesis, unknown: UnknownFit) -> float:
+        """Whitened square that a flown effect explains: of what generic terms do, no more than beside free numbers."""
+        told, more = self.nothing - unknown.misfit, h.fit.misfit - unknown.misfit
+        beside_numbers = told * (1.0 - more / max(self.own_numbers - unknown.misfit, 1e-9))
+        return min(self.nothing - h.fit.misfit, beside_numbers) if more > 0.0 else self.nothing - h.fit.misfit
 
     def posterior(self) -> Posterior:
         """All hypotheses with their probabilities.

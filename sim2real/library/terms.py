@@ -46,25 +46,28 @@ MODES = tuple(f"{kind}:{hertz:g}" for hertz in (2.0, 3.0, 4.5) for kind in ("rin
 # in the engines.
 BEYOND: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("x_force", "u", ("beta*beta", "rudder*rudder")),
-    ("z_force", "w", ("beta*beta", "alpha*alpha*alpha", "alpha_dot", "CT")),
+    ("z_force", "w", ("beta*beta", "alpha*alpha*alpha", "alpha*q", "alpha_dot", "CT", "alpha*CT")),
     ("pitching_moment", "q", ("beta*beta", "alpha*alpha*alpha", "elevator*elevator*elevator", "elevator*airspeed",
-                              "aileron", "p", "r", "q*q*q", "CT", "alpha*CT", "alpha_dot")),
-    ("y_force", "v", ("aileron", "alpha*p", "alpha*rudder", "beta*beta*beta", "airspeed", "beta_dot")),
-    ("rolling_moment", "p", ("alpha", "q", "alpha*p", "aileron*aileron*aileron", "aileron*airspeed",
-                              "beta*beta*beta", "p*p*p", "airspeed", "CT", "beta_dot")),
-    ("yawing_moment", "r", ("alpha", "q", "alpha*p", "alpha*aileron", "alpha*rudder", "beta*beta*beta",
+                              "aileron", "p", "r", "q*q*q", "alpha*q", "CT", "alpha*CT", "alpha_dot", "theta")),
+    ("y_force", "v", ("aileron", "alpha*p", "alpha*rudder", "beta*beta*beta", "airspeed", "beta*CT", "beta_dot")),
+    ("rolling_moment", "p", ("alpha", "q", "alpha*p", "alpha*r", "aileron*aileron*aileron", "aileron*airspeed",
+                              "beta*beta*beta", "p*p*p", "airspeed", "CT", "beta*CT", "beta_dot", "phi")),
+    ("yawing_moment", "r", ("alpha", "q", "alpha*p", "alpha*r", "alpha*aileron", "alpha*rudder", "beta*beta*beta",
                             "rudder*rudder*rudder", "rudder*airspeed", "r*r*r", "airspeed", "CT", "alpha*CT", "beta*CT",
                             "beta_dot")),
-    ("sensor:airspeed", "airspeed", ("alpha", "beta", "airspeed*airspeed", "CT")),
+    ("sensor:airspeed", "airspeed", ("alpha", "beta", "beta*beta", "airspeed*airspeed", "CT")),
     ("sensor:alpha", "alpha", ("airspeed", "q", "alpha*alpha", "CT")),
-    ("sensor:beta", "beta", ("alpha", "p", "r", "CT")),
-    ("sensor:p", "p", ("q", "r", "az")), ("sensor:q", "q", ("p", "r", "az")), ("sensor:r", "r", ("p", "q", "az")),
-    ("sensor:phi", "phi", ("theta", "slow_phi", "slow_ay")),
-    ("sensor:theta", "theta", ("phi", "slow_theta", "slow_ax")),
-    ("sensor:ax", "ax", ("q_dot", "alpha", "az")), ("sensor:ay", "ay", ("p_dot", "r_dot", "ax", "az", *MODES)),
-    ("sensor:az", "az", ("q", "q_dot", "ax", *MODES)),
+    ("sensor:beta", "beta", ("alpha", "p", "r", "beta*beta", "CT")),
+    ("sensor:p", "p", ("q", "r", "az", "p*p")), ("sensor:q", "q", ("p", "r", "az", "q*q")),
+    ("sensor:r", "r", ("p", "q", "az", "r*r")),
+    ("sensor:phi", "phi", ("theta", "phi*phi", "slow_phi", "slow_ay")),
+    ("sensor:theta", "theta", ("phi", "theta*theta", "slow_theta", "slow_ax")),
+    ("sensor:ax", "ax", ("q_dot", "alpha", "az", "ax*ax")),
+    ("sensor:ay", "ay", ("p_dot", "r_dot", "ax", "az", "ay*ay", *MODES)),
+    ("sensor:az", "az", ("q", "q_dot", "ax", "az*az", *MODES)),
     *((f"{s}_path", f"{s}_path", ("1", "position", "acceleration", "inertia", "position*position*position",
-                                  "direction", "side", "airspeed", flow))
+                                  "direction", "side", "magnitude", "airspeed", flow,
+                                  *(other for other in SURFACES if other != s)))
       for s, flow in zip(SURFACES, ("alpha", "p", "beta"), strict=True)),
     ("propulsion", "thrust", ("both", "both*airspeed", "left", "left*airspeed")),
 )  # fmt: skip
@@ -74,7 +77,8 @@ GENERIC_SIZE = {"u": 0.008, "w": 0.03, "v": 0.01, "p": 0.002, "q": 0.015, "r": 0
 PURE_DELAY = "delay"  # what a path may do beside its terms: not linear, so that it is none
 PATH_SIZE = {"1": 0.5 * math.pi / 180.0, "position": 0.1, "acceleration": 0.0025, "inertia": 0.005,
              "position*position*position": 0.1, "direction": 0.25 * math.pi / 180.0,
-             "side": 0.25 * math.pi / 180.0, PURE_DELAY: 1.0}  # rad, 1, s2, s2, 1, rad, rad (assumed); s
+             "side": 0.25 * math.pi / 180.0, "magnitude": 0.1,
+             PURE_DELAY: 1.0}  # rad, 1, s2, s2, 1, rad, rad, 1 (assumed); s
 THRUST_SIZE = 0.1  # (assumed)
 DEVIATION = {"alpha": 0.05, "beta": 0.05, "q": 0.1, "p": 0.2, "r": 0.1, "elevator": 0.04, "aileron": 0.08,
              "rudder": 0.05, "airspeed": 5.0, "CT": 0.015, "phi": 0.2, "theta": 0.1, "ax": 1.0, "ay": 1.0, "az": 2.0,
@@ -116,6 +120,13 @@ def at_any_time(flight: Reconstruction, component: str, first: int) -> list[Term
             for i, (kind, t) in enumerate(product(kinds, times))]
 
 
+def hats(flight: Reconstruction) -> FloatArray:
+    """A free course of time along a record: a hat about every knot [N, knots]."""
+    passed = flight.time - flight.time[0]
+    knots = np.arange(0.0, passed[-1] + KNOT, KNOT)
+    return np.asarray(np.maximum(1.0 - np.abs(passed[:, None] - knots) / KNOT, 0.0))
+
+
 def _thrust_pushes(flight: Reconstruction, term: Term) -> list[Push]:
     """A share of both engines' thrust or of the left one's: felt, and read where recorded."""
     side, _, course = term.name.partition("*")
@@ -143,7 +154,7 @@ def path_courses(flight: Reconstruction, position: FloatArray, names: Sequence[s
     course = {"1": np.ones(len(position)), "position": position, "acceleration": acceleration,
               "inertia": lfilter([share], [1.0, share - 1.0], acceleration),
               "position*position*position": position**3 / reach**2, "direction": np.tanh(rate / 0.02),
-              "side": np.tanh(position / 0.02)}  # fmt: skip
+              "side": np.tanh(position / 0.02), "magnitude": np.abs(position)}  # fmt: skip
     return [PATH_SIZE[name] * course[name] if name in course else PATH_SIZE["1"] * _course(flight, name)
             for name in names]
 

@@ -6,13 +6,14 @@ evidence is in closed form, and what so many heights take by luck they pay for.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from icing_env.record import FloatArray
+from sim2real.actuators.wandering import Wander
 from sim2real.library.terms import BEYOND, GENERIC
 from sim2real.posterior.generic import COURSE, UnknownFit
 from sim2real.records.side_by_side import each
@@ -54,6 +55,19 @@ def beside(courses: Courses, left: Remainder, places: Collection[str]) -> list[U
     return course_fits(courses, left.rows, left.gram[: left.first, : left.first], left.held, in_time(places), keep=True)
 
 
+def wander_fits(found: Mapping[str, Wander], misfit: float, tempering: float, taken: Collection[str] = ()
+                ) -> list[UnknownFit]:  # fmt: skip
+    """The same of surfaces' paths, which no flight shows.
+
+    Args:
+        found: of `wandering`.
+        misfit: whitened square that is left without, tempered.
+        taken: components that something known enters at: what is left there is its affair.
+    """
+    return [_fit(component, wander.inner / tempering, wander.onto / tempering, misfit)
+            for component, wander in found.items() if component not in taken]
+
+
 def _products(course: Course, places: Sequence[str], parts: Sequence[FloatArray], keep: bool
               ) -> dict[str, tuple[FloatArray, FloatArray]]:  # fmt: skip
     """Inner products of a record's hats, at each component, with themselves and with other rows."""
@@ -84,13 +98,13 @@ def _fit(component: str, inner: FloatArray, onto: FloatArray, misfit: float) -> 
 
 
 def with_courses(fits: Sequence[UnknownFit], courses: Sequence[UnknownFit]) -> list[UnknownFit]:
-    """Generic terms of every component, or a free course there: both counted, the likelier told."""
-    free, out = {u.component: u for u in courses}, []
+    """Generic terms of every component, or a free course or a delay there: all counted, the likeliest told."""
+    out = []
     for u in fits:
-        ways = [replace(u, log_evidence=u.log_evidence + float(np.log(1.0 - SHARE)))]
-        if u.component in free:
-            course = free[u.component]
-            ways.append(replace(course, log_evidence=course.log_evidence + float(np.log(SHARE))))
+        free = [course for course in courses if course.component == u.component]
+        share = SHARE / max(len(free), 1)
+        ways = [replace(u, log_evidence=u.log_evidence + float(np.log(1.0 - SHARE))),
+                *(replace(way, log_evidence=way.log_evidence + float(np.log(share))) for way in free)]
         together = float(np.logaddexp.reduce([way.log_evidence for way in ways]))
         out.append(replace(max(ways, key=lambda way: way.log_evidence), log_evidence=together))
     return out

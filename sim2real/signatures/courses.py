@@ -16,6 +16,7 @@ import numpy as np
 from icing_env.record import FloatArray
 from sim2real.actuators.lateness import Late
 from sim2real.actuators.paths import PATHS
+from sim2real.actuators.wandering import Wander
 from sim2real.library.terms import KNOT, Term, at_any_time, pushes
 from sim2real.prediction.predictor import Push
 from sim2real.records.side_by_side import each
@@ -34,7 +35,7 @@ class Remainder:
         first: the first of these.
         rows: those before it, of every record, in parts side by side [N x channels, first], but for the paths.
         excess: whitened square above noise that is left in paths, by component.
-        late: delays that would take most of what paths leave, by component.
+        late, wander: delays that would take most of what paths leave, and free courses there, by component.
         held: nuisances (by row) that are as far as they may be, and give way no more.
     """
 
@@ -43,11 +44,16 @@ class Remainder:
     rows: Sequence[Sequence[FloatArray]]
     excess: dict[str, float]
     late: dict[str, Late]
+    wander: dict[str, Wander]
     held: tuple[int, ...] = ()
 
     def reduced(self) -> FloatArray:
         """Inner products of what is left (row 0) and of generic terms, everything else free to give way."""
         return projected(self.gram, self.first, self.held)
+
+    def unbounded(self) -> float:
+        """Whitened square that would be left if no nuisance were held: what the model's own numbers could not do."""
+        return float(projected(self.gram[: self.first, : self.first], self.first)[0, 0])
 
 
 @dataclass(frozen=True)
