@@ -46,7 +46,8 @@ def test_tiers_gusts_forms_and_effects_are_all_drawn():
 
 def test_strangers_are_drawn_alone_each_in_turn_at_every_gust_and_are_in_no_other_list():
     names = {e.name for e in strangers.STRANGERS}
-    assert len(names) == len(strangers.STRANGERS) and not names & (set(effects.BY_NAME) | set(unknown.BY_NAME))
+    known = {*effects.BY_NAME, *unknown.BY_NAME, *(e.name for e in strangers.MET)}
+    assert len(names) == len(strangers.STRANGERS) and not names & known
     drawn = draw.stranger_designs(3 * len(names), 1)
     assert {d.tier for d in drawn} == {"unknown"}
     assert {(d.parts[0][0], d.sigma) for d in drawn} == {(n, s) for n in names for s in draw.SIGMAS}
@@ -78,8 +79,8 @@ def test_a_case_without_effects_is_the_published_aircraft_and_its_spread():
     assert len(texts) == 2 * len(PLANS[0])
 
 
-@pytest.mark.parametrize("pool", [effects.EFFECTS, unknown.UNKNOWN, strangers.STRANGERS],
-                         ids=["library", "unknown", "strangers"])
+@pytest.mark.parametrize("pool", [effects.EFFECTS, unknown.UNKNOWN, strangers.MET, strangers.STRANGERS],
+                         ids=["library", "unknown", "met", "strangers"])
 def test_every_effect_does_something_in_each_of_its_forms(pool, shape):
     for effect in pool:
         for form in ("same", "other") if effect.same is not effect.other else ("same",):

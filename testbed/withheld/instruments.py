@@ -88,7 +88,7 @@ def vanes(Y: NDArray, seen: NDArray, s: Mapping[str, float]) -> tuple[NDArray, N
 
 
 def sticking(x: NDArray, grip: float) -> NDArray:
-    """What a vane shows that does not move before the flow has turned by `grip`, and then follows it."""
+    """What an instrument shows that does not move before its input has by `grip`, and then follows it."""
     out = x.copy()
     for k in range(1, len(x) if grip > 0.0 else 0):
         out[k] = x[k] if abs(x[k] - out[k - 1]) > grip else out[k - 1]
@@ -99,9 +99,14 @@ def _upwash(Y: NDArray, seen: NDArray, s: Mapping[str, float]) -> NDArray | floa
     """Angle at the vane that goes with the thrust coefficient."""
     if not s.get("power_alpha"):
         return 0.0
+    ct = (seen[:, pl.TL] + seen[:, pl.TR]) / (_dynamic(Y, seen) * PUBLISHED["wing_area"])
+    return np.asarray(s["power_alpha"] * (ct - PUBLISHED["CT_reference"]))
+
+
+def _dynamic(Y: NDArray, seen: NDArray) -> NDArray:
+    """Dynamic pressure, Pa."""
     density = geopotential_pressure(Y[:, pl.H]) / (R_AIR * (288.15 - 0.0065 * Y[:, pl.H]))
-    dynamic = 0.5 * density * seen[:, pl.VT] ** 2 * PUBLISHED["wing_area"]
-    return np.asarray(s["power_alpha"] * ((seen[:, pl.TL] + seen[:, pl.TR]) / dynamic - PUBLISHED["CT_reference"]))
+    return np.asarray(0.5 * density * seen[:, pl.VT] ** 2)
 
 
 def exact(Y: NDArray, seen: NDArray, s: Mapping[str, float], start: float = 0.0) -> dict[str, NDArray]:
@@ -110,6 +115,7 @@ def exact(Y: NDArray, seen: NDArray, s: Mapping[str, float], start: float = 0.0)
     t = start + np.arange(len(Y)) * pl.DT
     speed = seen[:, pl.VT] * (1.0 + s.get("airspeed_alpha", 0.0) * seen[:, pl.ALPHA])
     speed = speed * (1.0 - s.get("sideslip_airspeed", 0.0) * seen[:, pl.BETA] ** 2)
+    speed = speed * np.sqrt(1.0 - s.get("static_alpha", 0.0) * seen[:, pl.ALPHA])
     speed = np.sqrt(np.maximum(speed**2 + 2.0 * s.get("pressure_airspeed", 0.0) * 72.0**2, 1.0))
     c = {"airspeed": (1.0 + s.get("scale_airspeed", 0.0)) * low(speed, gain(PUBLISHED["pitot_lag"]))}
     c["alpha"], c["beta"] = vanes(Y, seen, s)
@@ -120,15 +126,18 @@ def exact(Y: NDArray, seen: NDArray, s: Mapping[str, float], start: float = 0.0)
     if s.get("flexible_az"):
         raw["az"] = raw["az"] + s["flexible_az"] * (oscillator(raw["az"], 3.2, 0.08) - raw["az"])
     raw["az"] = raw["az"] + s.get("square_az", 0.0) * (raw["az"] + G0) ** 2
+    raw["ax"], raw["az"] = (raw["ax"] + s.get("tilt", 0.0) * raw["az"], raw["az"] - s.get("tilt", 0.0) * raw["ax"])
     raw["p"] = (1.0 + s.get("scale_p", 0.0)) * raw["p"]
     raw["q"] = raw["q"] + s.get("gyro_g", 0.0) * (raw["az"] + G0) + s.get("gyro_cross", 0.0) * Y[:, pl.P]
     c |= {name: low(x, recorder) for name, x in raw.items()}
     c |= {"phi": (1.0 + s.get("scale_phi", 0.0)) * Y[:, pl.PHI],
-          "theta": Y[:, pl.THETA] + s.get("attitude_cross", 0.0) * Y[:, pl.PHI], "psi": Y[:, pl.PSI]}  # fmt: skip
+          "theta": sticking(Y[:, pl.THETA], s.get("stuck_theta", 0.0)) + s.get("attitude_cross", 0.0) * Y[:, pl.PHI],
+          "psi": Y[:, pl.PSI]}  # fmt: skip
     for name in ("alpha", "beta", "q", "theta", "ax", "az"):
         wander = s.get(f"wander_{name}", 0.0)
         c[name] = c[name] + s.get(f"bias_{name}", 0.0) + wander * (1.0 + 0.15 * np.sin(2.0 * math.pi * t / 55.0))
     c |= {"thrust_left": seen[:, pl.TL], "thrust_right": seen[:, pl.TR], "pressure": geopotential_pressure(Y[:, pl.H])}
+    c["pressure"] = c["pressure"] + s.get("static_alpha", 0.0) * seen[:, pl.ALPHA] * _dynamic(Y, seen)
     rpm = PUBLISHED["propeller_rpm"]
     c |= {f"torque_{side}": Y[:, column] * 30.0 / (math.pi * rpm) for side, column in
           (("left", pl.PL), ("right", pl.PR))}  # fmt: skip

@@ -41,7 +41,8 @@ KNOBS = (
     "Cm_rotor_wake", "CY_alpha_rudder", "brake_drag",
     # strangers, in no list until a solver was done (`strangers.py`)
     "CD_beta2", "CZ_beta2", "Cm_alpha_q", "Cl_alpha_p", "CZ_ct_alpha", "Cl_wave", "loose_load", "rudder_one_sided",
-    "rudder_of_aileron")  # fmt: skip
+    "rudder_of_aileron", "flap_creep", "door", "fuel_shift", "aileron_brake", "surge", "elevator_up_lag", "front",
+    "yaw_damper")  # fmt: skip
 SENSOR_KNOBS = (
     "bias_alpha", "bias_beta", "bias_q", "bias_theta", "bias_ax", "bias_az",
     "wander_alpha", "wander_beta", "wander_q", "wander_theta", "wander_ax", "wander_az",  # bias that changes in time
@@ -50,7 +51,8 @@ SENSOR_KNOBS = (
     # in no library
     "flexible_az", "gyro_g", "gyro_cross", "attitude_cross", "airspeed_alpha",
     # strangers
-    "stuck_alpha", "square_az", "scale_p", "scale_phi", "scale_beta", "sideslip_airspeed", "power_alpha")  # fmt: skip
+    "stuck_alpha", "square_az", "scale_p", "scale_phi", "scale_beta", "sideslip_airspeed", "power_alpha",
+    "stuck_theta", "static_alpha", "tilt")  # fmt: skip
 
 
 def folder() -> Path:

@@ -68,7 +68,7 @@ def wind(y: Any, p: Any, t: float) -> tuple[float, float, float]:
     sph, cph, sth, cth = math.sin(y[PHI]), math.cos(y[PHI]), math.sin(y[THETA]), math.cos(y[THETA])
     sps, cps = math.sin(y[PSI]), math.cos(y[PSI])
     above = y[H] - p.altitude_start
-    north = p.shear * above + p.shear_bounded * 60.0 * math.tanh(above / 60.0)
+    north = p.shear * above + p.shear_bounded * 60.0 * math.tanh(above / 60.0) + p.front * math.tanh((t - 20.0) / 3.0)
     down = -p.wind_up - p.wind_wave * math.sin(2.0 * math.pi * t / 50.0)
     return (north * cth * cps - down * sth, north * (sph * sth * cps - cph * sps) + down * sph * cth,
             north * (cph * sth * cps + sph * sps) + down * cph * cth)
@@ -115,11 +115,13 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     xr = p.CX_0 + p.CX_0_right + (1.0 - right) * axial
     zw = 0.5 * (zl + zr)
     drag = p.CD_parasite + p.CD_alpha * (a / 0.06) ** 2 + p.CD_lift * zw * zw + p.brake_drag * abs(dr)
-    drag += p.CD_beta2 * b * b
+    gone = t / 40.0
+    drag += p.CD_beta2 * b * b + p.aileron_brake * abs(da) + (p.door if t > 20.0 else 0.0) - 0.2 * p.flap_creep * gone
     adot = (a - y[ALAG]) / 0.05
     cx = 0.5 * (xl + xr) - drag * ca
     cz = (zw - drag * sa + p.CZ_q * qh + p.CZ_elevator * de + p.CZ_CT * ct
-          + p.CZ_alphadot * adot * p.chord / (2.0 * V_) + p.CZ_beta2 * b * b + p.CZ_ct_alpha * ct * a)  # fmt: skip
+          + p.CZ_alphadot * adot * p.chord / (2.0 * V_) + p.CZ_beta2 * b * b + p.CZ_ct_alpha * ct * a
+          + p.flap_creep * gone)  # fmt: skip
 
     # tail
     arrival = (g[2] - g[3]) / V_
@@ -134,7 +136,8 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
           * (1.0 - p.tail_stall_elevator_loss * tail)
           + p.Cm_CT * ct + p.Cm_ct2 * (ct + 6.0 * ct * ct) - tail * p.Cm_alpha_tail * (at + p.alpha_tail_stall)
           + p.Cm_at_72 * fast + p.Cm_aileron * da + p.Cm_beta2 * b * b + p.Cm_alpha3 * (a - 0.03) ** 3
-          + p.Cm_rotor_wake * ct * (a - 0.03) + p.Cm_alpha_q * (a - 0.03) * qh)  # fmt: skip
+          + p.Cm_rotor_wake * ct * (a - 0.03) + p.Cm_alpha_q * (a - 0.03) * qh
+          + 0.1 * p.flap_creep * gone)  # fmt: skip
 
     # lateral
     loss = 1.0 - p.damping_separated * share
@@ -154,11 +157,13 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     # forces, moments about the c.g., rigid body
     X, Y, Z = qS * cx + thrust, qS * cy, qS * cz
     slosh = p.slosh_mass * 6.0 * (y[SLOSH] - y[PHI])  # N per unit angle: assumed pendulum in the tanks
-    L = qS * p.span * cl - p.cg_shift_y * Z + p.cg_shift_z * Y + p.slosh_mass * 9.8 * 2.5 * y[SLOSH]
+    aside = p.cg_shift_y + p.fuel_shift * gone
+    X += p.surge * thrust * math.sin(2.0 * math.pi * t / 3.0)
+    L = qS * p.span * cl - aside * Z + p.cg_shift_z * Y + p.slosh_mass * 9.8 * 2.5 * y[SLOSH]
     Y = Y + slosh
     M = (qS * p.chord * cm - p.cg_shift_z * X + (p.cg_shift_x + p.loose_load * y[THETA]) * Z
          + p.engine_arm_z * thrust + p.gyroscopic * y[R])  # fmt: skip
-    N = qS * p.span * cn - p.cg_shift_x * Y + p.cg_shift_y * X + p.engine_arm_y * (tl - tr) - p.gyroscopic * y[Q]
+    N = qS * p.span * cn - p.cg_shift_x * Y + aside * X + p.engine_arm_y * (tl - tr) - p.gyroscopic * y[Q]
     fx, fy, fz = X / p.mass, Y / p.mass, Z / p.mass
     Ix, Iy, Iz, Ixz = p.inertia_xx, p.inertia_yy, p.inertia_zz, p.inertia_xz
     roll = L + Ixz * y[P] * y[Q] + (Iy - Iz) * y[Q] * y[R]
@@ -181,8 +186,9 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     ta = u[1] - min(max(u[1], -p.aileron_dead), p.aileron_dead)
     ta = p.aileron_gearing * ta + p.aileron_cubic * ta * (ta / 0.1) ** 2
     tu = p.rudder_gearing * u[2] + p.rudder_cubic * u[2] * (u[2] / 0.1) ** 2
-    tu += p.rudder_one_sided * max(u[2], 0.0) + p.rudder_of_aileron * u[1]
-    d[DE], d[DE1] = surface(y[DE], y[DE1], te, p.elevator_min, p.elevator_max, p.elevator_lag, p.elevator_rate,
+    tu += p.rudder_one_sided * max(u[2], 0.0) + p.rudder_of_aileron * u[1] + p.yaw_damper * y[R]
+    lag = p.elevator_lag + (p.elevator_up_lag if te < y[DE] else 0.0)
+    d[DE], d[DE1] = surface(y[DE], y[DE1], te, p.elevator_min, p.elevator_max, lag, p.elevator_rate,
                             p.elevator_frequency, p.elevator_soft_rate)  # fmt: skip
     d[DA], d[DA1] = surface(y[DA], y[DA1], ta, p.aileron_min, p.aileron_max, p.aileron_lag, p.aileron_rate,
                             p.aileron_frequency, 0.0)  # fmt: skip

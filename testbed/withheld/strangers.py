@@ -1,7 +1,7 @@
 """Effects drawn up when a solver was done, to see what it says of what nobody had in mind while it was written.
 
 `unknown.py` has such that no library holds, too, but their failures were looked at, and generic terms added for some of
-them. Whoever mends a solver by what it said of these makes them known; then it takes others. Sizes as there (assumed).
+them. Whoever mends a solver by what it said of STRANGERS makes them MET, and takes others. Sizes as there (assumed).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ def _one(name: str, where: tuple[str, ...], typical: float, form: Form, signed: 
     return Effect(name, where, "size", typical, form, form, signed)
 
 
-STRANGERS: tuple[Effect, ...] = (
+MET: tuple[Effect, ...] = (  # by the solver of 26 November 2026
     _one("drag_of_sideslip", ("x_force",), 1.5, plus("CD_beta2"), False),  # per rad2
     _one("lift_of_sideslip", ("z_force",), 6.0, plus("CZ_beta2")),  # per rad2: the fuselage shades the wing
     _one("roll_of_yaw_rate", ("rolling_moment",), 0.8, times("Cl_r")),
@@ -35,4 +35,17 @@ STRANGERS: tuple[Effect, ...] = (
     _one("airspeed_in_sideslip", ("sensor:airspeed",), 1.5, sense("sideslip_airspeed")),  # per rad2
     _one("vane_in_slipstream", ("sensor:alpha",), 0.1, sense("power_alpha")),  # rad per thrust coefficient
 )
-BY_NAME = {effect.name: effect for effect in STRANGERS}
+STRANGERS: tuple[Effect, ...] = (
+    _one("flap_creeps", ("z_force", "pitching_moment", "x_force"), -0.08, plus("flap_creep")),  # CZ in 40 s
+    _one("door_opens", ("x_force",), 0.012, plus("door"), False),  # drag coefficient from 20 s on
+    _one("fuel_shifts", ("mass", "rolling_moment"), 0.15, plus("fuel_shift")),  # m to the side in 40 s
+    _one("aileron_drag", ("x_force",), 0.15, plus("aileron_brake"), False),  # per rad
+    _one("thrust_surges", ("propulsion", "x_force"), 0.1, plus("surge"), False),  # every 3 s, unseen by the torque
+    _one("attitude_sticks", ("sensor:theta",), 0.006, sense("stuck_theta"), False),  # rad
+    _one("static_at_alpha", ("sensor:airspeed", "sensor:altitude"), 0.3, sense("static_alpha")),  # dynamic pressures
+    _one("tilted_accelerometers", ("sensor:ax", "sensor:az"), 0.015, sense("tilt")),  # rad
+    _one("elevator_slow_up", ("elevator_path",), 0.12, plus("elevator_up_lag"), False),  # s more, trailing edge up
+    _one("wind_front", ("wind",), 4.0, plus("front")),  # m/s, passing at 20 s
+    _one("yaw_damper", ("rudder_path",), 0.3, plus("yaw_damper")),  # s: hidden from the command
+)
+BY_NAME = {effect.name: effect for effect in (*MET, *STRANGERS)}
