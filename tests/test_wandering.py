@@ -104,3 +104,16 @@ def test_a_gearing_of_one_side_is_told_by_the_magnitude():
         terms = named["other_form"]["terms"]
     told = {term["term"]: term["coefficient"] for term in terms}
     assert told["magnitude"] == pytest.approx(-0.1, abs=0.03)
+
+
+def test_a_surface_that_moves_as_no_term_has_it_is_unknown_and_said_to_go_with_time():
+    """A pick-up's course of its own, in what was recorded and nowhere in flight: its command knows nothing of it."""
+    records = []
+    for seed in (4, 5):
+        record = flown(seed)
+        apart = 0.01 * np.sin(2.0 * np.pi * record.time / 9.0) * np.sin(2.0 * np.pi * record.time / 31.0)
+        records.append(with_channel(record, "rudder_command", apart))
+    found = diagnose(records)
+    assert found.verdict == "unknown" and found.unknown is not None
+    assert (found.unknown["component"], found.unknown["kind"]) == ("rudder_path", "time_varying")
+    assert [term["term"] for term in found.unknown["terms"]] == ["course"]

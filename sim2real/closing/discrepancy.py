@@ -25,6 +25,7 @@ from sim2real.library.candidates import Bank, Nuisance, shifted
 from sim2real.library.terms import DEVIATION, FROM_ZERO, GENERIC, GENERIC_SIZE, PURE_DELAY, unit_of
 from sim2real.posterior.attribution import nuisance_mean, reduce, with_prior
 from sim2real.posterior.form import WORTH
+from sim2real.posterior.generic import COURSE
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
 from sim2real.posterior.sets import SetFit
 from sim2real.posterior.singles import DETECTABLE
@@ -70,9 +71,9 @@ class Description:
 
     @property
     def kind(self) -> str:
-        """static, dynamic (a delay) or time_varying, by the surest term that is not constant."""
+        """static, dynamic (a delay) or time_varying (a free course, too), by the surest term that is not constant."""
         leading = next((name for name, _, _ in self.terms if name != "1"), "1")
-        return "time_varying" if leading == "time" else "dynamic" if leading.endswith(LATE) else "static"
+        return "time_varying" if leading in ("time", COURSE) else "dynamic" if leading.endswith(LATE) else "static"
 
     def answer(self) -> dict[str, Any]:
         """As the interface has it."""

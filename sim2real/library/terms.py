@@ -264,7 +264,7 @@ def unit_of(term: str, component: str, reach: Mapping[str, float] | None = None)
 
 def _unit(term: str, component: str) -> float:
     if component.endswith("_path"):
-        return PATH_SIZE[term] if term in PATH_SIZE else PATH_SIZE["1"] / DEVIATION[term]
+        return PATH_SIZE[term] if term in PATH_SIZE else PATH_SIZE["1"] / DEVIATION.get(term, 1.0)
     if component == "propulsion":
         return THRUST_SIZE / (DEVIATION["airspeed"] if term.endswith("*airspeed") else 1.0)
     target = next(target for where, target, _ in GENERIC if where == component)
