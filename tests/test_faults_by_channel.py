@@ -27,8 +27,9 @@ UNITS = {**dict.fromkeys(ANGLES, (57.29578,)), **dict.fromkeys(("ax", "ay", "az"
          "airspeed": (1.9438, 3.2808), "ground_speed": (1.9438,), "altitude": (3.2808,), "pressure": (0.01,),
          "temperature": (0.02,), "thrust_left": (0.2248,), "thrust_right": (0.2248,), "mass": (2.2046, 0.06852),
          "lwc": (1000.0,), "throttle_left": (100.0,)}  # fmt: skip
-# Known to do harm in silence: the pedals of this flight rest so often that two seconds more of it do not stand out.
-HOLES = {("totter_f1_017_data.mat", "rudder", "frozen")}
+# Known to do harm in silence: the pedals of this flight, the yoke of that one (8 s, one input) rest so often that two
+# seconds more of it do not stand out.
+HOLES = {("totter_f1_017_data.mat", "rudder", "frozen"), ("totter_demo_data.mat", "elevator", "frozen")}
 FAULTS = ("constant", "gap", "spike", "reversed", "unit", "nan runs", "frozen")
 
 
