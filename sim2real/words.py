@@ -7,6 +7,7 @@ from typing import Any
 
 from sim2real.diagnosis import Diagnosis
 from sim2real.library.terms import PURE_DELAY
+from sim2real.posterior.generic import COURSE
 
 
 def sentences(found: Diagnosis) -> list[str]:
@@ -53,6 +54,11 @@ def _finding(found: Diagnosis) -> str:
 def late_by(unknown: Mapping[str, Any]) -> float:
     """By how much a path answers late [s], if that is what the library lacks; else zero."""
     return float(sum(t["coefficient"] for t in unknown["terms"] if t["term"] == PURE_DELAY))
+
+
+def term_named(term: str) -> str:
+    """A term as tables have it; a free course of time is told by the root mean square of its heights."""
+    return "course of time, RMS" if term == COURSE else term
 
 
 def _another_aircraft(unknown: dict[str, Any], named: list[str], sure: str) -> str:

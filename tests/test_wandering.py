@@ -13,7 +13,8 @@ from icing_env.record import FlightRecord
 from sim2real.actuators.paths import answered, believed
 from sim2real.actuators.wandering import Wander, wandering
 from sim2real.diagnosis import diagnose
-from sim2real.library.terms import PATH_SIZE, hats
+from sim2real.library.knots import hats
+from sim2real.library.terms import PATH_SIZE
 from sim2real.posterior.any_course import wander_fits
 from sim2real.records.channels import SURFACES
 from sim2real.records.reconstruct import reconstruct

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from icing_env.record import FloatArray
-from sim2real.actuators.paths import counted, late_squares, moves
+from sim2real.actuators.paths import counted, late_squares, moving
 from sim2real.records.channels import SURFACES
 from sim2real.records.reconstruct import Reconstruction
 
@@ -48,7 +48,7 @@ def lateness(flights: Sequence[Reconstruction], rows: Sequence[NDArray], first: 
     """
     found = {}
     for surface in SURFACES:
-        there = [(f, row) for f, row in zip(flights, rows, strict=True) if moves(f, surface)]
+        there = moving(flights, rows, surface)
         moved, stated = _square(surface, first, there), _square(surface, 0, [(f, f.parameters) for f, _ in there])
         noise, of_whole = (sum(counted(f, len(f.time) - since) for f, _ in there) for since in (first, 0))
         if there and (late := _best(moved, noise)) is not None:

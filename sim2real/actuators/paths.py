@@ -82,6 +82,12 @@ def moves(flight: Reconstruction, surface: str) -> bool:
                 and np.isfinite(flight.positions[surface]).any())  # fmt: skip
 
 
+def moving(flights: Sequence[Reconstruction], rows: Sequence[NDArray], surface: str
+           ) -> list[tuple[Reconstruction, NDArray]]:  # fmt: skip
+    """The records where a surface moves, each with its PARAMETERS row."""
+    return [(f, row) for f, row in zip(flights, rows, strict=True) if moves(f, surface)]
+
+
 def believed(flight: Reconstruction, surface: str, predicted: FloatArray) -> FloatArray:
     """What is left of a surface's positions [N, rows] over its noise: sample by sample, and a delay that lasts."""
     measured = flight.positions[surface][:, None]

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from icing_env.record import FloatArray
-from sim2real.actuators.paths import answered, believed, moves
-from sim2real.library.terms import PATH_SIZE, hats
+from sim2real.actuators.paths import answered, believed, moving
+from sim2real.library.knots import hats
+from sim2real.library.terms import PATH_SIZE
 from sim2real.records.channels import SURFACES
 from sim2real.records.reconstruct import Reconstruction
 
@@ -37,7 +38,7 @@ def wandering(flights: Sequence[Reconstruction], rows: Sequence[NDArray], first:
     """
     found = {}
     for surface in SURFACES:
-        there = [(f, row) for f, row in zip(flights, rows, strict=True) if moves(f, surface)]
+        there = moving(flights, rows, surface)
         if there:
             inner, onto = zip(*(_of_record(f, row, surface, first) for f, row in there), strict=True)
             found[f"{surface}_path"] = Wander(block_diag(*inner), np.concatenate(onto))

@@ -12,6 +12,7 @@ from scipy.signal import bilinear, lfilter
 
 from icing_env.atmosphere import density
 from icing_env.record import FloatArray
+from sim2real.library.knots import hat, knots
 from sim2real.prediction.predictor import Push
 from sim2real.records.channels import MEASURED, SURFACES, TOLERANCE
 from sim2real.records.reconstruct import Reconstruction
@@ -89,7 +90,7 @@ DAMPING = 0.15  # of a mode (assumed: a real one's is less, but its frequency is
 FROM_ZERO = ("alpha", "beta", "p", "q", "r")  # channels whose scale counts from zero
 SECOND_ORDER = 0.1  # s, by which an actuator of second order smooths what it lacks in acceleration (assumed)
 ERECTION = 30.0  # s in which a vertical gyro follows a false vertical (assumed)
-KNOT, KNOT_AT = 1.0, "at:"  # s between the knots of a free course of time (assumed: manoeuvres are slower)
+KNOT_AT = "at:"  # how the hat about a knot is named
 
 
 def pushes(flight: Reconstruction, terms: Sequence[Term]) -> tuple[Push, ...]:
@@ -113,18 +114,10 @@ def at_any_time(flight: Reconstruction, component: str, first: int) -> list[Term
     Args:
         first: row of the first.
     """
-    times = np.arange(0.0, flight.time[-1] - flight.time[0] + KNOT, KNOT)
     target = next(target for where, target, _ in (*GENERIC, *BEYOND) if where == component)
     kinds = ("both*", "left*") if component == "propulsion" else ("",)
     return [Term(component, f"{kind}{KNOT_AT}{t:g}", target, first + i)
-            for i, (kind, t) in enumerate(product(kinds, times))]
-
-
-def hats(flight: Reconstruction) -> FloatArray:
-    """A free course of time along a record: a hat about every knot [N, knots]."""
-    passed = flight.time - flight.time[0]
-    knots = np.arange(0.0, passed[-1] + KNOT, KNOT)
-    return np.asarray(np.maximum(1.0 - np.abs(passed[:, None] - knots) / KNOT, 0.0))
+            for i, (kind, t) in enumerate(product(kinds, knots(flight)))]
 
 
 def _thrust_pushes(flight: Reconstruction, term: Term) -> list[Push]:
@@ -187,8 +180,7 @@ def _course(flight: Reconstruction, name: str, aerodynamic: bool = False) -> Flo
     if name == "time":
         return np.linspace(-1.0, 1.0, n)
     if name.startswith(KNOT_AT):
-        passed = flight.time - flight.time[0] - float(name.removeprefix(KNOT_AT))
-        return np.maximum(1.0 - np.abs(passed) / KNOT, 0.0)
+        return hat(flight.time - flight.time[0], float(name.removeprefix(KNOT_AT)))
     out = np.ones(n)
     for factor in name.split("*"):
         values = _values(flight, factor)

@@ -17,7 +17,8 @@ from icing_env.record import FloatArray
 from sim2real.actuators.lateness import Late
 from sim2real.actuators.paths import PATHS
 from sim2real.actuators.wandering import Wander
-from sim2real.library.terms import KNOT, Term, at_any_time, pushes
+from sim2real.library.knots import KNOT
+from sim2real.library.terms import Term, at_any_time, pushes
 from sim2real.prediction.predictor import Push
 from sim2real.records.side_by_side import each
 from sim2real.signatures.evidence import Evidence

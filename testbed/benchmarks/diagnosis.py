@@ -111,8 +111,9 @@ def untouched(out: Path, committed: Mapping[str, Any], published: Path | None = 
 
 
 def kind_of(committed: Mapping[str, Any]) -> str:
-    """What kind of set a manifest is of: its seed the operating system's, or one that is known."""
-    return "sealed" if committed["development_seed"] is None else "development"
+    """What kind of set a manifest is of: its seed the operating system's, or one that is known; and what it draws."""
+    seed = "sealed" if committed["development_seed"] is None else "development"
+    return f"{seed} strangers" if "strangers" in committed else seed
 
 
 def removals(keys: Path) -> dict[str, str]:

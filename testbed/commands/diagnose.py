@@ -160,10 +160,12 @@ def show(found: Diagnosis, result: dict[str, Any]) -> None:
 
 def show_unknown(unknown: dict[str, Any]) -> None:
     """The terms that what the library lacks is described by, as the report has them."""
+    from sim2real.words import term_named
+
     click.echo()
     print_table(f"What the library lacks: terms of {unknown['component']} ({unknown['kind']}), SI units",
                 {"term": "left", "coefficient": "right", "standard error": "right"},
-                [[t["term"], f"{t['coefficient']:.4g}", f"{t['std_error']:.2g}"] for t in unknown["terms"]])
+                [[term_named(t["term"]), f"{t['coefficient']:.4g}", f"{t['std_error']:.2g}"] for t in unknown["terms"]])
 
 
 def show_ladder(ladder: dict[str, Any]) -> None:

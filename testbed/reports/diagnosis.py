@@ -16,7 +16,7 @@ from sim2real.diagnosis import Diagnosis
 from sim2real.prediction.windows import COMPARED, cut, residuals
 from sim2real.records.channels import TOLERANCE
 from sim2real.where import stretches
-from sim2real.words import of_the_model, sentences
+from sim2real.words import of_the_model, sentences, term_named
 from testbed.commands.common import plain
 from testbed.reports.diagnosis_figures import bars, heat, ladder_gaps, regime_heat, size_histories
 from testbed.reports.page import Report
@@ -96,7 +96,7 @@ def _explanations(report: Report, result: Mapping[str, Any]) -> None:
 def _terms(report: Report, described: Mapping[str, Any], what: str) -> None:
     at = f"terms of {described['component']}" if "places" not in described else "changes of the model's numbers"
     report.table(["term", "coefficient", "standard error"],
-                 [[t["term"], t["coefficient"], t["std_error"]] for t in described["terms"]],
+                 [[term_named(t["term"]), t["coefficient"], t["std_error"]] for t in described["terms"]],
                  f"{what}, as {at} ({described['kind']}); coefficients in SI units, angles in rad, delays in s.")
 
 
