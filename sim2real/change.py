@@ -76,7 +76,8 @@ def changed(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
     alone, sigmas = remedy(told.explained, told.flown), [e.sigma_w for e in evidences]
     progress("flying the records freely, before and after")
     left = flown_freely(flights, sigmas, alone, seed)
-    if any_aircraft and incomplete(posterior, left, told.flown is None or bool(told.flown.values)):
+    all_of_it = (told.flown is None or bool(told.flown.values)) and not posterior.best.varies
+    if any_aircraft and incomplete(posterior, left, all_of_it):
         progress("fitting all numbers of the model, since what was found is not all")
         whole = fit_whole_model(flights, candidates, posterior)
         change = whole.remedy()

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from icing_env import effects
 from sim2real.library.bends import bends, natural, of_own
 from sim2real.library.candidates import bank
-from sim2real.library.terms import BEYOND, GENERIC, unit_of
+from sim2real.library.terms import BEYOND, GENERIC
+from sim2real.library.units import unit_of
 from sim2real.posterior.devices import within
 from sim2real.posterior.form import (
     ALIKE,

@@ -8,6 +8,8 @@ from functools import cache
 
 import numpy as np
 import pytest
+from flown_again import flown_again
+from numpy.typing import NDArray
 
 from icing_env import effects, scenario
 from icing_env.record import FlightRecord
@@ -17,9 +19,7 @@ from sim2real.over_time.by_stretch import BY_RECORD, SHARED, cut_up, random_walk
 from sim2real.over_time.varying import _or_any
 from sim2real.posterior.hypotheses import Hypothesis
 from sim2real.posterior.sets import SetFit
-from sim2real.prediction.predictor import Predictor, held
-from sim2real.records.channels import MEASURED
-from sim2real.records.reconstruct import reconstruct
+from sim2real.records.reconstruct import Reconstruction, reconstruct
 from sim2real.signatures.evidence import gather
 from sim2real.where import _variable
 from sim2real.words import sentences
@@ -40,19 +40,10 @@ def with_alpha(record: FlightRecord, offset: np.ndarray | float, flight: str = "
 
 def grown(name: str, parameter: str, size: Callable[[float], float]) -> FlightRecord:
     """The aircraft under the recorded controls with an effect of changing size, set anew every second."""
-    record = flown(3)
-    flight = reconstruct(record)
-    plant, rng, each = Predictor(flight, flight.parameters), np.random.default_rng(3), round(1.0 / flight.dt)
-    plant.place(0)
-    read = flight.measured.copy()
-    for k in range(0, len(flight.time) - 1, each):
-        row = effects.with_effects(flight.parameters, {name: {parameter: size(float(flight.time[k]))}})
-        plant.fleet.parameters[:] = held(row, flight.dt)
-        steps = min(each, len(flight.time) - 1 - k)
-        read[k + 1 : k + 1 + steps] = plant.fly(steps, k)[:, 0]
-    noisy = {c: np.where(np.isfinite(record[c]), read[:, j] + flight.noise[j] * rng.standard_normal(len(read)), np.nan)
-             for j, c in enumerate(MEASURED) if c in record.channels}
-    return replace(record, channels=dict(record.channels) | noisy)
+    def rows(flight: Reconstruction, t: float) -> NDArray:
+        return effects.with_effects(flight.parameters, {name: {parameter: size(t)}})
+
+    return flown_again(flown(3), rows, 1.0)
 
 
 def told(found: Diagnosis, name: str) -> dict:
@@ -145,3 +136,8 @@ def test_one_short_record_has_no_stretches_to_differ():
     found = diagnose([with_alpha(record, 0.02 * np.sin(record.time))])
     assert found.verdict == "unknown"
     assert all(effect["sizes"] is None for effect in found.effects)
+
+
+def test_a_drag_that_steps_is_no_instrument_though_a_course_of_ax_says_about_as_much():
+    found = diagnose([grown("ice_drag", "delta_CD_0", lambda t: 0.015 * (t > 26.0))])
+    assert found.where["components"]["x_force"] > 0.8 > 0.2 > found.where["components"]["sensor:ax"]

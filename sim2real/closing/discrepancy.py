@@ -22,7 +22,8 @@ from sim2real.baseline.references import Baseline
 from sim2real.flown.settling import nearer
 from sim2real.library.bends import COMPONENTS
 from sim2real.library.candidates import Bank, Nuisance, shifted
-from sim2real.library.terms import DEVIATION, FROM_ZERO, GENERIC, GENERIC_SIZE, PURE_DELAY, unit_of
+from sim2real.library.terms import DEVIATION, FROM_ZERO, GENERIC, GENERIC_SIZE, PURE_DELAY
+from sim2real.library.units import unit_of
 from sim2real.posterior.attribution import nuisance_mean, reduce, with_prior
 from sim2real.posterior.form import WORTH
 from sim2real.posterior.generic import COURSE

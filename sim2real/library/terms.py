@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -71,6 +71,7 @@ BEYOND: tuple[tuple[str, str, tuple[str, ...]], ...] = (
                                   *(other for other in SURFACES if other != s)))
       for s, flow in zip(SURFACES, ("alpha", "p", "beta"), strict=True)),
     ("propulsion", "thrust", ("both", "both*airspeed", "left", "left*airspeed")),
+    ("wind", "wind", ("along*time", "across*time")),
 )  # fmt: skip
 # One standard deviation of a generic coefficient with a time course of unit size (assumed: a quarter of the change
 # that typical effects of the library make).
@@ -81,6 +82,8 @@ PATH_SIZE = {"1": 0.5 * math.pi / 180.0, "position": 0.1, "acceleration": 0.0025
              "side": 0.25 * math.pi / 180.0, "magnitude": 0.1,
              PURE_DELAY: 1.0}  # rad, 1, s2, s2, 1, rad, rad, 1 (assumed); s
 THRUST_SIZE = 0.1  # (assumed)
+WIND = "wind"
+WIND_SIZE, WIND_CHANGE = 0.1, 1.0  # m/s2: of a wind that gathers all the time, and at a knot (assumed)
 DEVIATION = {"alpha": 0.05, "beta": 0.05, "q": 0.1, "p": 0.2, "r": 0.1, "elevator": 0.04, "aileron": 0.08,
              "rudder": 0.05, "airspeed": 5.0, "CT": 0.015, "phi": 0.2, "theta": 0.1, "ax": 1.0, "ay": 1.0, "az": 2.0,
              "p_dot": 1.0, "q_dot": 0.5, "r_dot": 0.3, "alpha_dot": 0.05, "beta_dot": 0.05,
@@ -100,6 +103,8 @@ def pushes(flight: Reconstruction, terms: Sequence[Term]) -> tuple[Push, ...]:
     for term in terms:
         if term.target == "thrust":
             out += _thrust_pushes(flight, term)
+        elif term.component == WIND:
+            out += _wind_pushes(flight, term)
         elif term.component.startswith("sensor:"):
             out.append(Push(term.row, term.target, _sensor_course(flight, term.name, term.target), True))
         elif not term.target.endswith("_path"):
@@ -109,13 +114,15 @@ def pushes(flight: Reconstruction, terms: Sequence[Term]) -> tuple[Push, ...]:
 
 
 def at_any_time(flight: Reconstruction, component: str, first: int) -> list[Term]:
-    """Terms that together are a free course of time at a force, a moment, a sensor or the engines, for one record.
+    """Terms that together are a free course of time at a force, a moment, a sensor, the engines or the wind.
 
     Args:
+        flight: one record.
+        component: where.
         first: row of the first.
     """
     target = next(target for where, target, _ in (*GENERIC, *BEYOND) if where == component)
-    kinds = ("both*", "left*") if component == "propulsion" else ("",)
+    kinds = {"propulsion": ("both*", "left*"), WIND: ("along*", "across*")}.get(component, ("",))
     return [Term(component, f"{kind}{KNOT_AT}{t:g}", target, first + i)
             for i, (kind, t) in enumerate(product(kinds, knots(flight)))]
 
@@ -135,6 +142,14 @@ def _thrust_pushes(flight: Reconstruction, term: Term) -> list[Push]:
                 Push(term.row, "q", p["engine_arm_z"] / p["inertia_yy"] * series, False),
                 Push(term.row, f"thrust_{side}", series, True)]
     return out
+
+
+def _wind_pushes(flight: Reconstruction, term: Term) -> list[Push]:
+    """A wind along or across the aircraft that gathers: to what flies in it, an acceleration that nothing feels."""
+    side, _, course = term.name.partition("*")
+    axis, felt = {"along": ("u", "ax"), "across": ("v", "ay")}[side]
+    gathers = np.full(len(flight.time), WIND_SIZE) if course == "time" else WIND_CHANGE * _course(flight, course)
+    return [Push(term.row, axis, -gathers, False), Push(term.row, felt, gathers, True)]
 
 
 def path_courses(flight: Reconstruction, position: FloatArray, names: Sequence[str]) -> list[FloatArray]:
@@ -237,38 +252,6 @@ def _ringing(flight: Reconstruction, name: str, channel: str) -> FloatArray:
     above = [2.0 * DAMPING * w, 0.0] if kind == "rings" else [2.0 * DAMPING * w * w]
     b, a = bilinear(above, [1.0, 2.0 * DAMPING * w, w * w], 1.0 / flight.dt)
     return np.asarray(0.1 * lfilter([0.0, *b], [*a, 0.0], values - values[0]))
-
-
-def unit_of(term: str, component: str, reach: Mapping[str, float] | None = None) -> float:
-    """What a generic coefficient of one stands for: of a force's or moment's coefficient, or a reading, per regressor.
-
-    Deviations are in the units of their channels; CT is power over airspeed, dynamic pressure and wing area.
-
-    Args:
-        reach: of the records.
-    """
-    course = term.removeprefix("slow_")
-    if component == "propulsion":
-        course = course.partition("*")[2]
-    own = component == f"sensor:{course}"  # a scale error is no course
-    return _unit(term, component) / (1.0 if own or reach is None else reach.get(course, 1.0))
-
-
-def _unit(term: str, component: str) -> float:
-    if component.endswith("_path"):
-        return PATH_SIZE[term] if term in PATH_SIZE else PATH_SIZE["1"] / DEVIATION.get(term, 1.0)
-    if component == "propulsion":
-        return THRUST_SIZE / (DEVIATION["airspeed"] if term.endswith("*airspeed") else 1.0)
-    target = next(target for where, target, _ in GENERIC if where == component)
-    if component.startswith("sensor:"):
-        if term.startswith("rings") or (term not in ("1", "time") and term.removesuffix("_dot") == target):
-            return 0.1
-        size = TOLERANCE[target]
-    else:
-        size = GENERIC_SIZE[target]
-    for factor in term.removeprefix("slow_").split("*"):
-        size /= DEVIATION.get(factor, 1.0)
-    return size
 
 
 def _pressed_area(flight: Reconstruction) -> FloatArray:

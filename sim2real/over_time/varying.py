@@ -10,7 +10,7 @@ is that something there varies in time, and that is unknown.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +27,7 @@ from sim2real.over_time.by_stretch import Way, cut_up, gaussian, products, respo
 from sim2real.over_time.history import SPREADS
 from sim2real.posterior.any_delay import is_delay
 from sim2real.posterior.form import forgiven
+from sim2real.posterior.generic import COURSE, UnknownFit
 from sim2real.posterior.hypotheses import Hypothesis, Posterior, Settled, normalised
 from sim2real.posterior.sets import SetFit
 from sim2real.records.reconstruct import Reconstruction
@@ -41,6 +42,7 @@ REACH = 2.5  # typical sizes: standard deviation of the common one (assumed)
 # Prior probability that a size varies so much that one size explains nothing (assumed): what goes with speed, and is
 # another in every record for that, is rather something unknown.
 VARIES = 0.01
+UNSURE = 0.015  # of the log evidence of a free course, by which that of another component may be too small (assumed)
 
 
 @dataclass(frozen=True)
@@ -73,27 +75,62 @@ def varying(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
         return posterior
     alone = [h for h in posterior.hypotheses if h.unknown is None and len(h.effects) == 1]
     likeliest = max(alone, key=lambda h: h.log_posterior).effects if alone else ()
+    places = _places(best.unknown, posterior.courses)
     home = [f for f in unbroken(candidates.families) if f.effect.name in posterior.fits
-            and (best.unknown.component in f.effect.enters_at or f.effect.name in best.effects + likeliest)]
+            and (places & set(f.effect.enters_at) or f.effect.name in best.effects + likeliest)]
     flying = _Flying(flights, candidates, evidences, baseline, posterior.tempering, cuts, tried)
     found = [(f, flying.fitted(f, centre)) for f in home]
     nothing = float(posterior.reduced[0, 0])
     least = min(noise(evidences, posterior.tempering), *(h.left for h in posterior.hypotheses),
                 *(fit.left for _, fit in found))  # fmt: skip
     single = max((h.log_prior for h in posterior.hypotheses if len(h.effects) == 1), default=-np.inf)
+    varied = [_hypothesis(candidates, family, fit, single + float(np.log(VARIES)), nothing, least)
+              for family, fit in found]
     told = {h.effects: h for h in posterior.hypotheses if h.unknown is None}
-    worth = list[float]()
-    for family, fit in found:
-        own = told.get((family.effect.name,))
-        log = fit.log + 0.5 * nothing
-        varied = Hypothesis(_set_fit(candidates, family, fit, log), None, single + float(np.log(VARIES)), log,
-                            regained=forgiven(fit.left - least, nothing - fit.left),
-                            settled=Settled(fit.nuisances, np.ones_like(fit.nuisances)))  # fmt: skip
-        worth.append(varied.log_evidence + varied.regained)
-        if own is None or varied.log_posterior > own.log_posterior:
-            told[varied.effects] = varied
-    others = [_or_any(h, worth) if h is best else h for h in posterior.hypotheses if h.unknown is not None]
+    told |= {h.effects: h for h in varied
+             if h.effects not in told or h.log_posterior > told[h.effects].log_posterior}  # fmt: skip
+    worth = [h.log_evidence + h.regained for h in varied]
+    first = home[int(np.argmax(worth))].effect.enters_at if worth else ()
+    unknown = _or_any(_placed(best, first, places, posterior.courses), worth)
+    others = [unknown if h is best else h for h in posterior.hypotheses if h.unknown is not None]
     return replace(posterior, hypotheses=normalised([*told.values(), *others], 0.0))
+
+
+def _hypothesis(candidates: Bank, family: Family, fit: _Fit, prior: float, nothing: float, least: float) -> Hypothesis:
+    """An effect whose size varies; what it leaves above `least` is forgiven as far as it explains `nothing`."""
+    log = fit.log + 0.5 * nothing
+    return Hypothesis(_set_fit(candidates, family, fit, log), None, prior, log,
+                      regained=forgiven(fit.left - least, nothing - fit.left),
+                      settled=Settled(fit.nuisances, np.ones_like(fit.nuisances)), varies=True)  # fmt: skip
+
+
+def _places(unknown: UnknownFit, courses: Sequence[UnknownFit]) -> set[str]:
+    """Components where an effect that varies may be what is unknown: there, and where a free course says about as much.
+
+    Courses go through a linear response: of what a large one explains, it is off by a hundredth and more.
+    """
+    if unknown.terms[0][0] != COURSE:
+        return {unknown.component}
+    said = {course.component: course.log_evidence for course in courses}
+    enough = (1.0 - UNSURE) * max(said.values(), default=np.inf)
+    return {unknown.component} | {component for component, log in said.items() if log > enough}
+
+
+def _placed(best: Hypothesis, entered: Sequence[str], places: Collection[str], courses: Sequence[UnknownFit]
+            ) -> Hypothesis:  # fmt: skip
+    """Something unknown where courses say it is, and of these places where the likeliest of what varies enters.
+
+    Args:
+        entered: components where that one enters.
+        places: of `_places`.
+    """
+    if best.unknown is None or best.unknown.component in entered:
+        return best
+    there = [course for course in courses if course.component in set(entered) & set(places)]
+    if not there:
+        return best
+    course = max(there, key=lambda course: course.log_evidence)
+    return replace(best, unknown=replace(course, log_evidence=best.unknown.log_evidence, misfit=best.unknown.misfit))
 
 
 def _or_any(unknown: Hypothesis, worth: Sequence[float]) -> Hypothesis:

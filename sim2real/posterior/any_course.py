@@ -14,7 +14,7 @@ from scipy.linalg import block_diag
 
 from icing_env.record import FloatArray
 from sim2real.actuators.wandering import Wander
-from sim2real.library.terms import BEYOND, GENERIC
+from sim2real.library.terms import BEYOND, GENERIC, WIND
 from sim2real.posterior.generic import COURSE, UnknownFit
 from sim2real.records.side_by_side import each
 from sim2real.signatures.courses import Course, Courses, Remainder, in_time
@@ -22,6 +22,7 @@ from sim2real.signatures.courses import Course, Courses, Remainder, in_time
 SIZES = (0.003, 0.01, 0.03, 0.1, 0.3)  # standard deviations of the heights, in units of a generic coefficient (assumed)
 SHARE = 1.0 / 3.0  # prior share of what is unknown at a component that generic terms do not follow (assumed)
 TOGETHER, MOST = 7, 5e8  # components whose responses are computed at once, and bytes that these may take
+GUSTY = 0.8  # m/s of gusts, in which a course of the wind counts half (set on clean development cases)
 PLACES = in_time({component for component, _, _ in (*GENERIC, *BEYOND)})
 
 
@@ -70,14 +71,22 @@ def wander_fits(found: Mapping[str, Wander], misfit: float, tempering: float, ta
 
 def _products(course: Course, places: Sequence[str], parts: Sequence[FloatArray], keep: bool
               ) -> dict[str, tuple[FloatArray, FloatArray]]:  # fmt: skip
-    """Inner products of a record's hats, at each component, with themselves and with other rows."""
+    """Inner products of a record's hats, at each component, with themselves and with other rows.
+
+    Gusts are no more than nearly Dryden's: what a course of the wind takes of them counts the less, the more there are.
+    """
+    found = dict[str, tuple[FloatArray, FloatArray]]()
     if keep:
-        return {place: (course.inner(place, place), course.onto(place, parts)) for place in places}
-    found, other = {}, np.concatenate(parts, axis=1)
-    at_once = max(1, min(TOGETHER, int(MOST / course.bytes)))
-    for k in range(0, len(places), at_once):
-        for component, rows in course.made(places[k : k + at_once]).items():
-            found[component] = np.asarray(rows.T @ rows), np.asarray(rows.T @ other)
+        found = {place: (course.inner(place, place), course.onto(place, parts)) for place in places}
+    else:
+        other = np.concatenate(parts, axis=1)
+        at_once = max(1, min(TOGETHER, int(MOST / course.bytes)))
+        for k in range(0, len(places), at_once):
+            for component, rows in course.made(places[k : k + at_once]).items():
+                found[component] = np.asarray(rows.T @ rows), np.asarray(rows.T @ other)
+    if WIND in found:
+        less = 1.0 + (course.evidence.gain.sigma / GUSTY) ** 4
+        found[WIND] = found[WIND][0] / less, found[WIND][1] / less
     return found
 
 

@@ -39,7 +39,7 @@ LEAST = 3.0  # whitened size of a set's signature below which its form does not 
 ALIKE = {
     "propulsion": ("propulsion", "x_force", "pitching_moment", "yawing_moment"),
     "mass": ("x_force", "z_force", "pitching_moment", "rolling_moment", "yawing_moment"),
-    "wind": ("x_force", "y_force", "z_force", "sensor:airspeed", "sensor:alpha", "sensor:beta",
+    "wind": ("wind", "x_force", "y_force", "z_force", "sensor:airspeed", "sensor:alpha", "sensor:beta",
              "sensor:altitude"),
 }
 # Where an effect may enter beside, in another form: a half wing that loses its roll loses lift and gains drag, and of

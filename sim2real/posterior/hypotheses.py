@@ -42,7 +42,7 @@ class Hypothesis:
 
     `form`: of its effects, where that may be another than the library's; `instead`: generic terms at home that say it
     better than the library's; `regained`: log evidence gained by these, and by what is forgiven (see `posterior.form`);
-    `settled`: where it was flown.
+    `settled`: where it was flown; `varies`: whether its effect's size differs along the records (`fit` has the mean).
     """
 
     fit: SetFit
@@ -54,6 +54,7 @@ class Hypothesis:
     regained: float = 0.0
     probability: float = 0.0
     settled: Settled | None = None
+    varies: bool = False
 
     @cached_property
     def effects(self) -> tuple[str, ...]:

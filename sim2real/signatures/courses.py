@@ -18,7 +18,7 @@ from sim2real.actuators.lateness import Late
 from sim2real.actuators.paths import PATHS
 from sim2real.actuators.wandering import Wander
 from sim2real.library.knots import KNOT
-from sim2real.library.terms import Term, at_any_time, pushes
+from sim2real.library.terms import WIND, Term, at_any_time, pushes
 from sim2real.prediction.predictor import Push
 from sim2real.records.side_by_side import each
 from sim2real.signatures.evidence import Evidence
@@ -179,7 +179,7 @@ class Courses:
         """Whitened square above chance that free courses at some components would take of what is left."""
         taken = sum(left.excess.get(component, 0.0) for component in components)
         gram = before = left.gram[: left.first, : left.first]
-        if names := in_time(components):
+        if names := tuple(name for name in in_time(components) if name != WIND):  # what gusts do is no form
             less = each(lambda course, rows: course.taken(names, rows, self.tempering), self.along, left.rows)
             gram = gram - sum(less)
             taken -= sum(course.freed(names, self.tempering).chance for course in self.along)
