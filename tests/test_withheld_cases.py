@@ -12,7 +12,7 @@ import pytest
 from icing_env import record
 from testbed.withheld import draw, effects, files, flights, generate, separation, strangers, unknown
 from testbed.withheld.manoeuvres import PLANS
-from testbed.withheld.numbers import airframe
+from testbed.withheld.published import airframe
 from testbed.withheld.shadow import shadow
 
 NULL = draw.Design("null", (), 0, 1.0, 0.5, 1.3, 1.0, {}, 7)

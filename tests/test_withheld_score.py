@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -147,6 +149,12 @@ def test_the_scorer_imports_nothing_but_json_and_numpy():
     names = {n.module if isinstance(n, ast.ImportFrom) else a.name for n in ast.walk(tree)
              if isinstance(n, ast.Import | ast.ImportFrom) for a in n.names}  # fmt: skip
     assert names <= {"__future__", "json", "math", "re", "sys", "collections.abc", "pathlib", "typing", "numpy"}
+
+
+def test_the_scorer_runs_where_it_lies(perfect):
+    command = [sys.executable, score.__file__, *map(str, perfect)]
+    said = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert json.loads(said.stdout)["top1"] == 1.0
 
 
 def test_a_killed_run_goes_on_with_the_answers_it_has(perfect, tmp_path):

@@ -22,7 +22,7 @@ from sim2real.signatures.courses import Course, Courses, Remainder, in_time
 SIZES = (0.003, 0.01, 0.03, 0.1, 0.3)  # standard deviations of the heights, in units of a generic coefficient (assumed)
 SHARE = 1.0 / 3.0  # prior share of what is unknown at a component that generic terms do not follow (assumed)
 TOGETHER, MOST = 7, 5e8  # components whose responses are computed at once, and bytes that these may take
-GUSTY = 0.8  # m/s of gusts, in which a course of the wind counts half (set on clean development cases)
+GUSTY = 0.3  # m/s of gusts, in which a course of the wind counts half (set on clean aircraft)
 PLACES = in_time({component for component, _, _ in (*GENERIC, *BEYOND)})
 
 
@@ -85,7 +85,7 @@ def _products(course: Course, places: Sequence[str], parts: Sequence[FloatArray]
             for component, rows in course.made(places[k : k + at_once]).items():
                 found[component] = np.asarray(rows.T @ rows), np.asarray(rows.T @ other)
     if WIND in found:
-        less = 1.0 + (course.evidence.gain.sigma / GUSTY) ** 4
+        less = 1.0 + (course.evidence.gain.sigma / GUSTY) ** 2
         found[WIND] = found[WIND][0] / less, found[WIND][1] / less
     return found
 

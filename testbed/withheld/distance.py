@@ -19,7 +19,7 @@ from scipy.linalg import solve_continuous_lyapunov, solve_discrete_are
 from testbed.withheld import gusts, instruments, trim
 from testbed.withheld import plant as pl
 from testbed.withheld.flights import Flown
-from testbed.withheld.numbers import PUBLISHED, airframe
+from testbed.withheld.published import PUBLISHED, airframe
 
 MOTION = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "ax", "ay", "az", "altitude")
 X = (pl.H, pl.U, pl.V, pl.W, pl.PHI, pl.THETA, pl.P, pl.Q, pl.R, pl.ADW)

@@ -8,7 +8,7 @@ import numpy as np
 
 from testbed.withheld.effects import EFFECTS, Effect
 from testbed.withheld.manoeuvres import PLANS
-from testbed.withheld.numbers import DERIVATIVES
+from testbed.withheld.published import DERIVATIVES
 from testbed.withheld.strangers import STRANGERS
 from testbed.withheld.unknown import UNKNOWN
 

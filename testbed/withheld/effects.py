@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from testbed.withheld.numbers import PUBLISHED
+from testbed.withheld.published import PUBLISHED
 
 Change = tuple[dict[str, float], dict[str, float]]
 Form = Callable[[float], Change]

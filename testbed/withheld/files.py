@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from testbed.withheld import instruments
-from testbed.withheld.numbers import PUBLISHED
 from testbed.withheld.plant import DT
+from testbed.withheld.published import PUBLISHED
 
 COMMANDS = ("elevator_command", "aileron_command", "rudder_command", "throttle_left", "throttle_right")
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from testbed.withheld import effects, gusts, instruments, manoeuvres, strangers, trim, unknown
 from testbed.withheld import plant as pl
-from testbed.withheld.numbers import DTYPE, KNOBS, PUBLISHED, SENSOR_KNOBS, airframe
+from testbed.withheld.published import DTYPE, KNOBS, PUBLISHED, SENSOR_KNOBS, airframe
 
 CATALOGUE = {**effects.BY_NAME, **unknown.BY_NAME, **strangers.BY_NAME}
 

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from testbed.withheld import files, numbers
+from testbed.withheld import files, published
 from testbed.withheld.draw import Design, designs, stranger_designs
 from testbed.withheld.faults import excused, fault_count, fault_designs, spoiled
 from testbed.withheld.flights import CATALOGUE, Aircraft, recorded
@@ -73,7 +73,7 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
                 done += made
                 progress(f"flown {done} of {len(drawn)}")
     sealed = files.manifest(records, keys, names) | {
-        "numbers": numbers.digest(), "count": cases, "development_seed": seed if known else None} | (
+        "numbers": published.digest(), "count": cases, "development_seed": seed if known else None} | (
         {"strangers": True} if strangers else {})
     if (out / "manifest.json").is_file() and files.read_json(out / "manifest.json") != sealed:
         raise ValueError(f"{out}: what was drawn is not what its manifest tells: another generator, or other versions")

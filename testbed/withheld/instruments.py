@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter, lfilter_zi
 
 from testbed.withheld import plant as pl
-from testbed.withheld.numbers import PUBLISHED
+from testbed.withheld.published import PUBLISHED
 
 FAST = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "psi", "ax", "ay", "az",
         "elevator", "aileron", "rudder")  # fmt: skip
@@ -70,7 +70,8 @@ def vanes(Y: NDArray, seen: NDArray, s: Mapping[str, float]) -> tuple[NDArray, N
     """Angle of attack and sideslip as the recorder gets them, errors of vane and boom in."""
     n = PUBLISHED
     offset = s.get("vane_error", 0.0) / np.maximum(seen[:, pl.VT], 1.0)
-    alpha = seen[:, pl.ALPHA] + offset * Y[:, pl.Q]
+    aside = s.get("vane_aside", 0.0) / np.maximum(seen[:, pl.VT], 1.0)
+    alpha = seen[:, pl.ALPHA] + offset * Y[:, pl.Q] + aside * Y[:, pl.P]
     beta = seen[:, pl.BETA] - (offset + s.get("vane_cross", 0.0) / np.maximum(seen[:, pl.VT], 1.0)) * Y[:, pl.R]
     lag = n["vane_lag"] + s.get("vane_extra", 0.0)
     alpha, beta = low(alpha, gain(lag)), low(beta, gain(lag))
@@ -117,6 +118,7 @@ def exact(Y: NDArray, seen: NDArray, s: Mapping[str, float], start: float = 0.0)
     speed = speed * (1.0 - s.get("sideslip_airspeed", 0.0) * seen[:, pl.BETA] ** 2)
     speed = speed * np.sqrt(1.0 - s.get("static_alpha", 0.0) * seen[:, pl.ALPHA])
     speed = np.sqrt(np.maximum(speed**2 + 2.0 * s.get("pressure_airspeed", 0.0) * 72.0**2, 1.0))
+    speed = speed * (1.0 + s.get("pitot_water", 0.0) * np.exp(-(((t - 18.0) / 1.5) ** 2)))
     c = {"airspeed": (1.0 + s.get("scale_airspeed", 0.0)) * low(speed, gain(PUBLISHED["pitot_lag"]))}
     c["alpha"], c["beta"] = vanes(Y, seen, s)
     c["alpha"] = c["alpha"] * (1.0 + s.get("scale_alpha", 0.0)) + s.get("scale_alpha2", 0.0) * c["alpha"] ** 2 / 0.06
@@ -127,7 +129,7 @@ def exact(Y: NDArray, seen: NDArray, s: Mapping[str, float], start: float = 0.0)
         raw["az"] = raw["az"] + s["flexible_az"] * (oscillator(raw["az"], 3.2, 0.08) - raw["az"])
     raw["az"] = raw["az"] + s.get("square_az", 0.0) * (raw["az"] + G0) ** 2
     raw["ax"], raw["az"] = (raw["ax"] + s.get("tilt", 0.0) * raw["az"], raw["az"] - s.get("tilt", 0.0) * raw["ax"])
-    raw["p"] = (1.0 + s.get("scale_p", 0.0)) * raw["p"]
+    raw["p"] = (1.0 + s.get("scale_p", 0.0)) * raw["p"] + s.get("warm_p", 0.0) * (1.0 - np.exp(-t / 12.0))
     raw["q"] = raw["q"] + s.get("gyro_g", 0.0) * (raw["az"] + G0) + s.get("gyro_cross", 0.0) * Y[:, pl.P]
     c |= {name: low(x, recorder) for name, x in raw.items()}
     c |= {"phi": (1.0 + s.get("scale_phi", 0.0)) * Y[:, pl.PHI],
@@ -138,6 +140,7 @@ def exact(Y: NDArray, seen: NDArray, s: Mapping[str, float], start: float = 0.0)
         c[name] = c[name] + s.get(f"bias_{name}", 0.0) + wander * (1.0 + 0.15 * np.sin(2.0 * math.pi * t / 55.0))
     c |= {"thrust_left": seen[:, pl.TL], "thrust_right": seen[:, pl.TR], "pressure": geopotential_pressure(Y[:, pl.H])}
     c["pressure"] = c["pressure"] + s.get("static_alpha", 0.0) * seen[:, pl.ALPHA] * _dynamic(Y, seen)
+    c["pressure"] = low(c["pressure"], gain(s.get("static_lag", 0.0)))
     rpm = PUBLISHED["propeller_rpm"]
     c |= {f"torque_{side}": Y[:, column] * 30.0 / (math.pi * rpm) for side, column in
           (("left", pl.PL), ("right", pl.PR))}  # fmt: skip

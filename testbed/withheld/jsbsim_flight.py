@@ -23,7 +23,7 @@ from testbed.withheld import plant as pl
 from testbed.withheld.jsbsim_edit import AIRCRAFT, QUIET, Edit, edited
 from testbed.withheld.jsbsim_trim import FT, SIDES, settle
 from testbed.withheld.manoeuvres import Manoeuvre
-from testbed.withheld.numbers import PUBLISHED
+from testbed.withheld.published import PUBLISHED
 
 LBF, SLUG, HP = 4.4482216152605, 14.593902937, 745.69987158227
 SLUG_FT2 = SLUG * FT * FT

@@ -20,7 +20,7 @@ from testbed.withheld.instruments import G0
 from testbed.withheld.jsbsim_cases import aircraft
 from testbed.withheld.jsbsim_flight import Flight, fly
 from testbed.withheld.manoeuvres import DEG, Manoeuvre
-from testbed.withheld.numbers import airframe
+from testbed.withheld.published import airframe
 
 HALF_SECOND = 0.5  # s
 # tolerances of docs/interfaces: ax 0.02 g, ay 0.05 g, az 0.10 g, rates 2 deg/s

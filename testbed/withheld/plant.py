@@ -1,7 +1,7 @@
 """The aircraft again, from docs/model.md for flaps-up flight in free air, and Bogacki and Shampine's integrator.
 
 Euler angles instead of a quaternion, the third-order Runge-Kutta method of Bogacki & Shampine (Appl. Math. Lett. 2(4),
-1989) at 5 ms, gusts that change within a sample. Numbers with a knob are neutral at 0 (`numbers.py`). Left out, since
+1989) at 5 ms, gusts that change within a sample. Numbers with a knob are neutral at 0 (`published.py`). Left out, since
 they do not act here: flap, ground, hinge-moment float below its limits, ice. SI and radians.
 """
 
@@ -70,6 +70,7 @@ def wind(y: Any, p: Any, t: float) -> tuple[float, float, float]:
     above = y[H] - p.altitude_start
     north = p.shear * above + p.shear_bounded * 60.0 * math.tanh(above / 60.0) + p.front * math.tanh((t - 20.0) / 3.0)
     down = -p.wind_up - p.wind_wave * math.sin(2.0 * math.pi * t / 50.0)
+    down -= p.thermal * math.exp(-((t - 20.0) / 5.0) ** 2)
     return (north * cth * cps - down * sth, north * (sph * sth * cps - cph * sps) + down * sph * cth,
             north * (cph * sth * cps + sph * sps) + down * cph * cth)
 
@@ -91,7 +92,7 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
 
     # engines
     per = p.propeller_efficiency / math.sqrt(ua * ua + p.propeller_static_speed**2) * (1.0 + p.thrust_at_72 * fast**2)
-    tl = p.thrust_factor_left * y[PL] * per
+    tl = p.thrust_factor_left * y[PL] * per * (1.0 + p.left_of_alpha * (a - 0.03))
     tr = p.thrust_factor_right * y[PR] * per * (1.0 + p.thrust_right_at_72 * fast**2)
     thrust = tl + tr
     ct = min(thrust / qS, 1.0) - p.CT_reference
@@ -121,7 +122,8 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     cx = 0.5 * (xl + xr) - drag * ca
     cz = (zw - drag * sa + p.CZ_q * qh + p.CZ_elevator * de + p.CZ_CT * ct
           + p.CZ_alphadot * adot * p.chord / (2.0 * V_) + p.CZ_beta2 * b * b + p.CZ_ct_alpha * ct * a
-          + p.flap_creep * gone)  # fmt: skip
+          + p.flap_creep * gone + p.CZ_hysteresis * math.tanh(adot / 0.05) + p.CZ_aileron_abs * abs(da))  # fmt: skip
+    load = -qS * cz / (p.mass * gravity) - 1.0
 
     # tail
     arrival = (g[2] - g[3]) / V_
@@ -148,7 +150,8 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
           + loss * (p.Cl_p * ph + bounded(p.Cl_p_soft, ph, 0.1) + p.Cl_aileron * da
                     + bounded(p.Cl_aileron_soft, da, 0.3))
           + p.lift_arm * 0.5 * (zr - zl) + p.Cl_at_72 * fast + p.Cl_torque * ct
-          + p.Cl_alpha_p * (a - 0.03) * ph + p.Cl_wave * math.sin(2.0 * math.pi * t / 7.0))  # fmt: skip
+          + p.Cl_alpha_p * (a - 0.03) * ph + p.Cl_wave * math.sin(2.0 * math.pi * t / 7.0)
+          + p.Cl_beta_load * b * load + p.wake * math.exp(-((t - 22.0) ** 2)))  # fmt: skip
     cn = (p.Cn_0 + fin * (p.Cn_beta * b + p.Cn_rudder * dr) + bounded(p.Cn_beta_soft, b, 0.25) + p.Cn_p * ph
           + p.Cn_r * rh + p.Cn_aileron * da + bounded(p.Cn_rudder_soft, dr, 0.25) - p.lift_arm * 0.5 * (xr - xl)
           + p.Cn_betadot * (b - y[BLAG]) / 0.1 * p.span / (2.0 * V_) + p.Cn_pfactor * a * ct
@@ -161,7 +164,8 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     X += p.surge * thrust * math.sin(2.0 * math.pi * t / 3.0)
     L = qS * p.span * cl - aside * Z + p.cg_shift_z * Y + p.slosh_mass * 9.8 * 2.5 * y[SLOSH]
     Y = Y + slosh
-    M = (qS * p.chord * cm - p.cg_shift_z * X + (p.cg_shift_x + p.loose_load * y[THETA]) * Z
+    ahead = p.cg_shift_x + p.loose_load * y[THETA] + p.fuel_surge * X / p.mass
+    M = (qS * p.chord * cm - p.cg_shift_z * X + ahead * Z
          + p.engine_arm_z * thrust + p.gyroscopic * y[R])  # fmt: skip
     N = qS * p.span * cn - p.cg_shift_x * Y + aside * X + p.engine_arm_y * (tl - tr) - p.gyroscopic * y[Q]
     fx, fy, fz = X / p.mass, Y / p.mass, Z / p.mass
@@ -182,9 +186,10 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
 
     # surfaces and engines
     te = p.elevator_gearing * u[0] + p.elevator_cubic * u[0] * (u[0] / 0.1) ** 2
-    te += p.elevator_offset + p.elevator_float * fast**2
+    te += p.elevator_offset + p.elevator_float * fast**2 + p.elevator_hunt * math.sin(2.0 * math.pi * 0.8 * t)
     ta = u[1] - min(max(u[1], -p.aileron_dead), p.aileron_dead)
     ta = p.aileron_gearing * ta + p.aileron_cubic * ta * (ta / 0.1) ** 2
+    ta = y[DA] if abs(ta - y[DA]) < p.aileron_friction else ta
     tu = p.rudder_gearing * u[2] + p.rudder_cubic * u[2] * (u[2] / 0.1) ** 2
     tu += p.rudder_one_sided * max(u[2], 0.0) + p.rudder_of_aileron * u[1] + p.yaw_damper * y[R]
     lag = p.elevator_lag + (p.elevator_up_lag if te < y[DE] else 0.0)

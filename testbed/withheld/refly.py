@@ -26,7 +26,7 @@ from testbed.withheld.effects import BY_NAME
 from testbed.withheld.files import read_json, write_text
 from testbed.withheld.flights import Aircraft, recorded
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
-from testbed.withheld.numbers import DERIVATIVES, SENSOR_KNOBS
+from testbed.withheld.published import DERIVATIVES, SENSOR_KNOBS
 from testbed.withheld.windows import gap_of, held
 from testbed.workers import a_core_each
 

@@ -20,7 +20,7 @@ from testbed.withheld.distance import Whitener
 from testbed.withheld.draw import MASS_RANGE, MOST, SPREAD
 from testbed.withheld.flights import Aircraft, Flown, fly
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
-from testbed.withheld.numbers import DERIVATIVES
+from testbed.withheld.published import DERIVATIVES
 from testbed.withheld.shadow import shadow
 
 MASS_SPREAD = MASS_RANGE / 3**0.5  # of a uniform distribution

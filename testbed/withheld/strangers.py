@@ -13,7 +13,7 @@ def _one(name: str, where: tuple[str, ...], typical: float, form: Form, signed: 
     return Effect(name, where, "size", typical, form, form, signed)
 
 
-MET: tuple[Effect, ...] = (  # by the solver of 26 November 2026
+MET: tuple[Effect, ...] = (  # by the solvers of 26 November 2026: the first list, then (from flap_creeps on) the second
     _one("drag_of_sideslip", ("x_force",), 1.5, plus("CD_beta2"), False),  # per rad2
     _one("lift_of_sideslip", ("z_force",), 6.0, plus("CZ_beta2")),  # per rad2: the fuselage shades the wing
     _one("roll_of_yaw_rate", ("rolling_moment",), 0.8, times("Cl_r")),
@@ -34,8 +34,6 @@ MET: tuple[Effect, ...] = (  # by the solver of 26 November 2026
     _one("sideslip_scale", ("sensor:beta",), 0.15, sense("scale_beta")),
     _one("airspeed_in_sideslip", ("sensor:airspeed",), 1.5, sense("sideslip_airspeed")),  # per rad2
     _one("vane_in_slipstream", ("sensor:alpha",), 0.1, sense("power_alpha")),  # rad per thrust coefficient
-)
-STRANGERS: tuple[Effect, ...] = (
     _one("flap_creeps", ("z_force", "pitching_moment", "x_force"), -0.08, plus("flap_creep")),  # CZ in 40 s
     _one("door_opens", ("x_force",), 0.012, plus("door"), False),  # drag coefficient from 20 s on
     _one("fuel_shifts", ("mass", "rolling_moment"), 0.15, plus("fuel_shift")),  # m to the side in 40 s
@@ -47,5 +45,20 @@ STRANGERS: tuple[Effect, ...] = (
     _one("elevator_slow_up", ("elevator_path",), 0.12, plus("elevator_up_lag"), False),  # s more, trailing edge up
     _one("wind_front", ("wind",), 4.0, plus("front")),  # m/s, passing at 20 s
     _one("yaw_damper", ("rudder_path",), 0.3, plus("yaw_damper")),  # s: hidden from the command
+)
+STRANGERS: tuple[Effect, ...] = (
+    _one("lift_hysteresis", ("z_force",), -0.02, plus("CZ_hysteresis")),  # CZ more while alpha grows
+    _one("aileron_lift", ("z_force",), 0.3, plus("CZ_aileron_abs")),  # per rad, either way
+    _one("fuel_surges", ("mass", "pitching_moment"), -0.03, plus("fuel_surge"), False),  # m aft per m/s2 ahead
+    _one("dihedral_of_load", ("rolling_moment",), -0.15, plus("Cl_beta_load")),  # per rad and g: the wing bends up
+    _one("wake_encounter", ("rolling_moment", "wind"), 0.01, plus("wake")),  # moment coefficient, a second at 22 s
+    _one("thermal", ("wind",), 3.0, plus("thermal")),  # m/s upward, ten seconds about 20 s
+    _one("elevator_hunts", ("elevator_path",), 0.005, plus("elevator_hunt"), False),  # rad at 0.8 Hz
+    _one("aileron_friction", ("aileron_path",), 0.01, plus("aileron_friction"), False),  # rad that move nothing
+    _one("vane_off_centre", ("sensor:alpha",), 3.0, sense("vane_aside")),  # m to the side
+    _one("roll_gyro_warms", ("sensor:p",), 0.006, sense("warm_p")),  # rad/s in the end, by 12 s
+    _one("water_in_pitot", ("sensor:airspeed",), -0.05, sense("pitot_water"), False),  # share, three seconds at 18 s
+    _one("slow_static", ("sensor:altitude",), 3.0, sense("static_lag"), False),  # s
+    _one("left_propeller_at_alpha", ("propulsion",), -1.5, plus("left_of_alpha")),  # share of its thrust per rad
 )
 BY_NAME = {effect.name: effect for effect in (*MET, *STRANGERS)}

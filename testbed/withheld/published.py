@@ -42,7 +42,8 @@ KNOBS = (
     # strangers, in no list until a solver was done (`strangers.py`)
     "CD_beta2", "CZ_beta2", "Cm_alpha_q", "Cl_alpha_p", "CZ_ct_alpha", "Cl_wave", "loose_load", "rudder_one_sided",
     "rudder_of_aileron", "flap_creep", "door", "fuel_shift", "aileron_brake", "surge", "elevator_up_lag", "front",
-    "yaw_damper")  # fmt: skip
+    "yaw_damper", "CZ_hysteresis", "CZ_aileron_abs", "fuel_surge", "Cl_beta_load", "wake", "thermal", "elevator_hunt",
+    "aileron_friction", "left_of_alpha")  # fmt: skip
 SENSOR_KNOBS = (
     "bias_alpha", "bias_beta", "bias_q", "bias_theta", "bias_ax", "bias_az",
     "wander_alpha", "wander_beta", "wander_q", "wander_theta", "wander_ax", "wander_az",  # bias that changes in time
@@ -52,7 +53,7 @@ SENSOR_KNOBS = (
     "flexible_az", "gyro_g", "gyro_cross", "attitude_cross", "airspeed_alpha",
     # strangers
     "stuck_alpha", "square_az", "scale_p", "scale_phi", "scale_beta", "sideslip_airspeed", "power_alpha",
-    "stuck_theta", "static_alpha", "tilt")  # fmt: skip
+    "stuck_theta", "static_alpha", "tilt", "vane_aside", "warm_p", "pitot_water", "static_lag")  # fmt: skip
 
 
 def folder() -> Path:
