@@ -6,27 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from free_courses import course_along, fits_beside
 
 from icing_env import scenario
-from sim2real.library.candidates import bank
-from sim2real.posterior.any_course import PLACES, course_fits, with_courses
+from sim2real.posterior.any_course import PLACES, with_courses
 from sim2real.posterior.generic import UnknownFit
 from sim2real.prediction.predictor import Push
-from sim2real.records.reconstruct import reconstruct
-from sim2real.signatures.courses import Course, Courses
-from sim2real.signatures.evidence import gather
+from sim2real.signatures.courses import Course
 from testbed.flight import fly
-
-NUISANCES = 4
 
 
 @pytest.fixture(scope="module")
 def course() -> Course:
     chosen = scenario.load("clear_air", duration=30.0, parameters={"turbulence_sigma_w": 0.5})
-    flight = reconstruct(fly(chosen, seed=11, observer=False, protection=False).record)
-    whole = bank()
-    only = replace(whole, families=(), terms=(), nuisances=whole.nuisances[:NUISANCES], size=1 + NUISANCES)
-    return Course(gather(flight, only))
+    return course_along(fly(chosen, seed=11, observer=False, protection=False).record)
 
 
 def fits(course: Course, target: str = "q", size: float = 0.0, seed: int = 0) -> list[UnknownFit]:
@@ -35,11 +28,7 @@ def fits(course: Course, target: str = "q", size: float = 0.0, seed: int = 0) ->
     series = size * np.sign(np.sin(1.3 * t)) * np.sin(0.37 * t) ** 3
     pushed = course.about.respond([Push(0, target, series, target not in "uvwpqr")]).values
     noise = np.random.default_rng(seed).standard_normal(pushed.shape) * (course.model != 0.0)
-    parts = [pushed + noise, course.evidence.rows]
-    rows = np.concatenate(parts, axis=1)
-    gram = rows.T @ rows
-    gram[1:, 1:] += np.eye(NUISANCES)
-    return course_fits(Courses([course], 1.0), [parts], gram)
+    return fits_beside(course, [pushed + noise, course.evidence.rows])
 
 
 def test_noise_shows_nothing(course):

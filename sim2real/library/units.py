@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from sim2real.library.terms import DEVIATION, GENERIC, GENERIC_SIZE, PATH_SIZE, THRUST_SIZE, WIND, WIND_SIZE
+from sim2real.library.terms import (
+    DEVIATION,
+    GENERIC,
+    GENERIC_SIZE,
+    PATH_SIZE,
+    THRUST_SIZE,
+    WIND,
+    WIND_CHANGE,
+    WIND_SIZE,
+)
 from sim2real.records.channels import TOLERANCE
 
 
@@ -27,7 +36,7 @@ def _unit(term: str, component: str) -> float:
     if component.endswith("_path"):
         return PATH_SIZE[term] if term in PATH_SIZE else PATH_SIZE["1"] / DEVIATION.get(term, 1.0)
     if component == WIND:
-        return WIND_SIZE
+        return WIND_SIZE if term.endswith("time") else WIND_CHANGE
     if component == "propulsion":
         return THRUST_SIZE / (DEVIATION["airspeed"] if term.endswith("*airspeed") else 1.0)
     target = next(target for where, target, _ in GENERIC if where == component)

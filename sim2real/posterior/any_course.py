@@ -41,8 +41,9 @@ def course_fits(courses: Courses, parts: Sequence[Sequence[FloatArray]], gram: F
     inverse = np.linalg.inv(gram[np.ix_(gone, gone)])
     moved = inverse @ gram[gone, 0]
     misfit, found = float(gram[0, 0] - gram[0, gone] @ moved), []
-    made = each(lambda course, own: _products(course, sorted(places), own, keep), courses.along, parts)
-    for component in sorted(places):
+    at = sorted(places)
+    made = each(lambda course, own: _counted(course, _products(course, at, own, keep)), courses.along, parts)
+    for component in at:
         inner = block_diag(*(products[component][0] for products in made)) / courses.tempering
         onto = np.concatenate([products[component][1] for products in made]) / courses.tempering
         if np.max(np.diag(inner), initial=0.0) > 1e-9:
@@ -71,23 +72,23 @@ def wander_fits(found: Mapping[str, Wander], misfit: float, tempering: float, ta
 
 def _products(course: Course, places: Sequence[str], parts: Sequence[FloatArray], keep: bool
               ) -> dict[str, tuple[FloatArray, FloatArray]]:  # fmt: skip
-    """Inner products of a record's hats, at each component, with themselves and with other rows.
-
-    Gusts are no more than nearly Dryden's: what a course of the wind takes of them counts the less, the more there are.
-    """
-    found = dict[str, tuple[FloatArray, FloatArray]]()
+    """Inner products of a record's hats, at each component, with themselves and with other rows."""
     if keep:
-        found = {place: (course.inner(place, place), course.onto(place, parts)) for place in places}
-    else:
-        other = np.concatenate(parts, axis=1)
-        at_once = max(1, min(TOGETHER, int(MOST / course.bytes)))
-        for k in range(0, len(places), at_once):
-            for component, rows in course.made(places[k : k + at_once]).items():
-                found[component] = np.asarray(rows.T @ rows), np.asarray(rows.T @ other)
-    if WIND in found:
-        less = 1.0 + (course.evidence.gain.sigma / GUSTY) ** 2
-        found[WIND] = found[WIND][0] / less, found[WIND][1] / less
+        return {place: (course.inner(place, place), course.onto(place, parts)) for place in places}
+    found, other = {}, np.concatenate(parts, axis=1)
+    at_once = max(1, min(TOGETHER, int(MOST / course.bytes)))
+    for k in range(0, len(places), at_once):
+        for component, rows in course.made(places[k : k + at_once]).items():
+            found[component] = np.asarray(rows.T @ rows), np.asarray(rows.T @ other)
     return found
+
+
+def _counted(course: Course, products: dict[str, tuple[FloatArray, FloatArray]]
+             ) -> dict[str, tuple[FloatArray, FloatArray]]:  # fmt: skip
+    """The same where the wind counts the less, the more gusts there are: these are no more than nearly Dryden's."""
+    less = 1.0 + (course.evidence.gain.sigma / GUSTY) ** 2
+    wind = {WIND: (products[WIND][0] / less, products[WIND][1] / less)} if WIND in products else {}
+    return products | wind
 
 
 def _fit(component: str, inner: FloatArray, onto: FloatArray, misfit: float) -> UnknownFit:
