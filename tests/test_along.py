@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from icing_env import scenario
-from sim2real.prediction.along import REST
-from sim2real.prediction.predictor import Predictor
+from sim2real.library.candidates import bank
+from sim2real.library.terms import pushes
+from sim2real.prediction.along import REST, STATES
+from sim2real.prediction.predictor import Predictor, Push
 from sim2real.records.channels import MEASURED, SURFACES
 from sim2real.records.reconstruct import Reconstruction, reconstruct
 from testbed.flight import fly
@@ -61,6 +63,31 @@ def test_a_row_flies_alone_as_in_a_batch(flight: Reconstruction) -> None:
         alone = innovations(flight, rows[row : row + 1], gain.K, own)
         np.testing.assert_array_equal(alone[:, 0], together[:, row])
     assert together.shape[2] == len(MEASURED)
+
+
+@pytest.mark.parametrize(("rate", "angle"), [("p", "phi"), ("q", "theta")])
+def test_what_turns_all_through_a_step_turns_by_half_of_its_end(flight: Reconstruction, rate: str, angle: str) -> None:
+    """Constant angular acceleration a: rate a dt and angle a dt^2/2 (but for damping, a twentieth in such a step)."""
+    two, size = Predictor(flight, np.repeat(flight.parameters, 2)), 0.4
+    two.place(0)
+    two.fly(1, pushes=(Push(1, rate, np.full(len(flight.time), size), False),))
+    plain, pushed = two.tangent()
+    at, turned = STATES.index(rate), len(STATES) + ("phi", "theta").index(angle)
+    assert pushed[at] - plain[at] == pytest.approx(size * flight.dt, rel=0.1)
+    assert pushed[turned] - plain[turned] == pytest.approx(0.5 * size * flight.dt**2, rel=0.1)
+
+
+@pytest.mark.parametrize(("component", "moment"), [("rolling_moment", (1.0, 0.0)), ("yawing_moment", (0.0, 1.0))])
+def test_a_generic_moment_turns_the_aircraft_as_its_inertias_have_it(flight: Reconstruction, component: str,
+                                                                      moment: tuple[float, float]) -> None:
+    term = next(t for t in bank().terms if (t.component, t.name) == (component, "1"))
+    made = {push.target: push.series for push in pushes(flight, [term])}
+    p = flight.parameters[0]
+    inertia = np.array([[p["inertia_xx"], -p["inertia_xz"]], [-p["inertia_xz"], p["inertia_zz"]]])
+    roll, yaw = np.linalg.solve(inertia, moment)
+    assert set(made) == {"p", "r"}
+    np.testing.assert_allclose(made["r"] * roll, made["p"] * yaw, rtol=1e-9)
+    assert made["p" if moment[0] else "r"].min() > 0.0
 
 
 def test_thrust_is_read_through_the_wind(flight: Reconstruction) -> None:

@@ -108,8 +108,8 @@ def pushes(flight: Reconstruction, terms: Sequence[Term]) -> tuple[Push, ...]:
         elif term.component.startswith("sensor:"):
             out.append(Push(term.row, term.target, _sensor_course(flight, term.name, term.target), True))
         elif not term.target.endswith("_path"):
-            series = GENERIC_SIZE[term.target] * scale[term.target] * _course(flight, term.name, True)
-            out.append(Push(term.row, term.target, series, False))
+            series = GENERIC_SIZE[term.target] * _course(flight, term.name, True)
+            out += [Push(term.row, state, per_unit * series, False) for state, per_unit in scale[term.target].items()]
     return tuple(out)
 
 
@@ -260,11 +260,17 @@ def _pressed_area(flight: Reconstruction) -> FloatArray:
     return np.asarray(0.5 * rho * flight.channel("airspeed") ** 2 * flight.parameters[0]["wing_area"])
 
 
-def _scales(flight: Reconstruction) -> dict[str, FloatArray]:
-    """Acceleration per unit coefficient along a record [m/s2, rad/s2], each [N]."""
+def _scales(flight: Reconstruction) -> dict[str, dict[str, FloatArray]]:
+    """Accelerations of states per unit coefficient along a record [m/s2, rad/s2], each [N].
+
+    A moment about one axis also turns the aircraft about the other that its product of inertia ties to it.
+    """
     p, qs = flight.parameters[0], _pressed_area(flight)
-    return {"u": qs / p["mass"], "v": qs / p["mass"], "w": qs / p["mass"], "p": qs * p["span"] / p["inertia_xx"],
-            "q": qs * p["chord"] / p["inertia_yy"], "r": qs * p["span"] / p["inertia_zz"]}  # fmt: skip
+    xx, zz, xz = p["inertia_xx"], p["inertia_zz"], p["inertia_xz"]
+    lateral = qs * p["span"] / (xx * zz - xz**2)
+    return {**{force: {force: qs / p["mass"]} for force in ("u", "v", "w")},
+            "q": {"q": qs * p["chord"] / p["inertia_yy"]},
+            "p": {"p": zz * lateral, "r": xz * lateral}, "r": {"r": xx * lateral, "p": xz * lateral}}
 
 
 def in_what_is_left(terms: Sequence[Term]) -> tuple[Term, ...]:

@@ -97,6 +97,23 @@ def steer(x: Any, u: Any, now: Any, then: Any) -> None:
 
 
 @kernel
+def push(x: Any, state: Any, size: Any, half: Any) -> None:
+    """Add to one row's state what acts on it all through a step of twice `half`.
+
+    It is added before the step. What turns the aircraft would turn it by twice as much so; half of that is taken back.
+    """
+    x[state] += size
+    for r in range(3):
+        if state == X[3 + r]:
+            p, q, s = -half*size*(r == 0), -half*size*(r == 1), -half*size*(r == 2)
+            u, v, w = x[X[0]], x[X[1]], x[X[2]]
+            x[X[0]], x[X[1]], x[X[2]] = u + s*v - q*w, v + p*w - s*u, w + q*u - p*v
+            e0, e1, e2, e3 = x[_E0], x[_E1], x[_E2], x[_E3]
+            x[_E0], x[_E1] = e0 - 0.5*(e1*p + e2*q + e3*s), e1 + 0.5*(e0*p + e2*s - e3*q)
+            x[_E2], x[_E3] = e2 + 0.5*(e0*q + e3*p - e1*s), e3 + 0.5*(e0*s + e1*q - e2*p)
+
+
+@kernel
 def read(out: Any, x: Any, y: Any, p: Any) -> None:
     """What one row's instruments should read, in the order of MEASURED."""
     for c in range(11):
@@ -210,7 +227,8 @@ def along(table: Any, controls: Any, first: Any, last: Any, measured: Any, stret
         stretch: by which a fed-back channel's error is multiplied [n, FED_BACK].
         gain: [1 or n, steps, FED_BACK, states then roll and pitch] of the record's steps, the last one's goes on; empty
             for free flight.
-        force_at, force: (row, state) of what is added to states [F, 2], and how much at each sample [F, N].
+        force_at, force: (row, state) of what is added to states [F, 2], and how much in a step, as it is at each
+            sample [F, N].
         error_at, error: (row, channel) of what is added to readings [E, 2], and how much at each sample [E, N].
         known: what every row is accelerated by at each sample beside its own forces, m/s2 and rad/s2 in the order of
             STATES [N, 6]; empty if nothing.
@@ -242,6 +260,11 @@ def along(table: Any, controls: Any, first: Any, last: Any, measured: Any, stret
                     present_aircraft(states[i], parameters[i], currents[i])
                     fill(block, AT_CURRENT, j, held[i])
                 block[(AT_CURRENT + _ELAPSED)*LANES + j] = states[i].step*clock.dt
+            for j in range(len(force)):
+                i = force_at[j, 0]
+                if at <= i < at + count:
+                    now = min(first[i] + k, last[i] - 1)
+                    push(x[i], force_at[j, 1], 0.5*(force[j, now] + force[j, now + 1]), 0.5*clock.dt)
             advance(block, states[at:], parameters[at:], speeds[at:], count, clock.dt, clock.substeps)
             for j in range(count):
                 i = at + j
@@ -272,7 +295,3 @@ def along(table: Any, controls: Any, first: Any, last: Any, measured: Any, stret
                                       scratch)
                 for j in range(count):
                     correct(x[at + j], y[at + j, _PHI], change, j)
-            for j in range(len(force)):
-                i = force_at[j, 0]
-                if at <= i < at + count:
-                    x[i, force_at[j, 1]] += force[j, min(first[i] + k, last[i] - 1) + 1]

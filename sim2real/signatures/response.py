@@ -54,7 +54,8 @@ class Filter:
         out = np.zeros(((len(flight.time) - 1 - self.first) * len(MEASURED), len(rows)))
         if not rows:
             return Responses((), out)
-        forces = [(rows.index(q.row), STATES.index(q.target), q.series * flight.dt) for q in pushes if not q.sensor]
+        forces = [(rows.index(q.row), at, series) for q in pushes if not q.sensor
+                  for at, series in _in_a_step(flight, q.target, q.series * flight.dt)]  # fmt: skip
         felt = [(rows.index(q.row), MEASURED.index("a" + "xyz"["uvw".index(q.target)]), q.series) for q in pushes
                 if not q.sensor and q.target in "uvw"]  # fmt: skip
         errors = felt + [(rows.index(q.row), MEASURED.index(q.target), q.series) for q in pushes if q.sensor]
@@ -74,6 +75,19 @@ class Filter:
         found = [linearise(self.flight, spans[k : k + AT_ONCE])[:2] for k in range(0, len(spans), AT_ONCE)]
         A, C = (np.concatenate(matrices) for matrices in zip(*found, strict=True))
         return A, C, each
+
+
+def _in_a_step(flight: Reconstruction, target: str, size: FloatArray) -> list[tuple[int, FloatArray]]:
+    """What acts on a state through every step, put at its start [N]: of a turn, half is taken back (`along.push`)."""
+    if target not in "pqr":
+        return [(STATES.index(target), size)]
+    phi, theta, V, alpha, beta = (flight.channel(name) for name in ("phi", "theta", "airspeed", "alpha", "beta"))
+    u, v, w, back, roll = V * np.cos(alpha), V * beta, V * np.sin(alpha), -0.5 * flight.dt * size, len(STATES)
+    axes: dict[str, list[tuple[int, float | FloatArray]]] = {
+        "p": [(1, w), (2, -v), (roll, 1.0)],
+        "q": [(0, -w), (2, u), (roll, np.tan(theta) * np.sin(phi)), (roll + 1, np.cos(phi))],
+        "r": [(0, v), (1, -u), (roll, np.tan(theta) * np.cos(phi)), (roll + 1, -np.sin(phi))]}  # fmt: skip
+    return [(STATES.index(target), size), *((at, back * by) for at, by in axes[target])]
 
 
 def _in_turn(pushes: Sequence[Push], rows: Sequence[int]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -102,8 +116,8 @@ def _respond(A: Any, C: Any, each: int, gain: Any, weight: Any, force_at: Any, f
         A, C: of the one-step map in the middle of every span of `each` steps [spans, states or channels, states].
         gain: [steps, states, FED_BACK], the last step's goes on.
         weight: of every reading in the correction, zero where nothing was measured [N, channels].
-        force_at, force: (row, state) of what is added to states [F, 2], and how much at each sample [N, F]; rows as
-            they stand in `order`.
+        force_at, force: (row, state) of what is added to states [F, 2], and how much in a step, as it is at each
+            sample [N, F]; rows as they stand in `order`.
         error_at, error: (row, channel) of what is added to readings [E, 2], and how much at each sample [N, E].
         factor: [N-1, channels, channels].
         order: where each row stands in `out` [rows].
@@ -132,7 +146,11 @@ def _respond(A: Any, C: Any, each: int, gain: Any, weight: Any, force_at: Any, f
         for s in range(n):
             for c in range(fed):
                 fall[s, c] = own[s, c]*weight[k + 1, c]
-        both[:n] = (1.0 - share)*A[i] + share*A[j] - np.dot(fall, both[n : n + fed])
+        both[:n] = (1.0 - share)*A[i] + share*A[j]
+        for f in range(len(force_at)):
+            if force_at[f, 0] < rows:
+                x[force_at[f, 1], force_at[f, 0]] += 0.5*(force[k, f] + force[k + 1, f])
+        both[:n] -= np.dot(fall, both[n : n + fed])
         np.dot(both, x, after)
         x[:] = after[:n]
         for e in range(len(error_at)):
@@ -142,9 +160,6 @@ def _respond(A: Any, C: Any, each: int, gain: Any, weight: Any, force_at: Any, f
                 if channel < fed:
                     for s in range(n):
                         x[s, row] -= fall[s, channel]*size
-        for f in range(len(force_at)):
-            if force_at[f, 0] < rows:
-                x[force_at[f, 1], force_at[f, 0]] += force[k + 1, f]
         if k >= first:
             for c in range(m):
                 for d in range(m):
