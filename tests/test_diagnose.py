@@ -84,6 +84,18 @@ def test_an_effect_left_out_of_the_library_is_not_named():
     assert all("alpha_bias" not in h["effects"] for h in found.hypotheses)
 
 
+@pytest.mark.parametrize(("effect", "value", "component", "term"), [
+    ("rudder_power:change", -0.35, "yawing_moment", "rudder"),
+    ("dihedral_effect:change", 0.6, "rolling_moment", "beta"),
+])  # fmt: skip
+def test_a_neighbour_that_helps_the_models_own_numbers_within_their_range_is_not_the_cause(effect, value, component,
+                                                                                         term):
+    """No number may be so far off; any effect that takes what is beyond would explain all, if that were held for it."""
+    found = diagnose([flown(effect, value, 3)], without=[effect.partition(":")[0]])
+    assert found.verdict == "unknown" and found.unknown["component"] == component
+    assert any(term in told["term"] for told in found.unknown["terms"])
+
+
 def test_the_answer_has_its_form():
     result = answer(diagnosed("lift_slope:change", -0.25, 3, 13))
     assert set(result) == KEYS

@@ -219,6 +219,7 @@ def test_something_unknown_is_worth_what_it_is_where_it_is_flown(bent):
     assert there.log_evidence > linear.log_evidence and there.misfit < linear.misfit
     far, near = (float(np.sum(at.settled.nuisances**2)) for at in (flown.point, point))
     assert near < 0.5 * far  # the model's own numbers have let go of what the terms say
+    assert len(there.terms) <= len(linear.terms)  # nor are those needed any more that stood in for them
     path = found.get("elevator_path", replace(linear, component="elevator_path"))
     untouched = flown_unknown(flying, SetFit(misfit=0.0), flown, path)  # judged on commands alone, exactly linear
     assert untouched[0] is path and untouched[1] is flown.point

@@ -15,12 +15,12 @@ from icing_env.record import FloatArray
 from sim2real.flown.points import Flying
 from sim2real.flown.steps import Point, bounded_step, rooms, size_steps
 from sim2real.posterior.form import WORTH, Form
-from sim2real.posterior.generic import UnknownFit
+from sim2real.posterior.generic import UnknownFit, fit_unknown_left
 from sim2real.posterior.home_terms import gain
 from sim2real.posterior.sets import SetFit
 from sim2real.signatures.courses import Remainder
 
-ROUNDS, SETTLED = 4, 0.5  # steps towards the best, and the gain of log evidence below which one is the last
+ROUNDS, SETTLED = 6, 0.5  # steps towards the best, and the gain of log evidence below which one is the last
 
 
 @dataclass(frozen=True)
@@ -62,10 +62,11 @@ def other_form(flying: Flying, fit: SetFit, flown: Bent, rows: Sequence[int], sq
 def flown_unknown(flying: Flying, fit: SetFit, flown: Bent, unknown: UnknownFit) -> tuple[UnknownFit, Point]:
     """Something unknown beside a set, its terms (and nuisances with them) brought to their best where they are flown.
 
-    Its evidence is corrected by what all terms of the component together gain there over what the linear fit says.
+    Its terms are chosen anew there: where the model's own numbers went as far as they may, they need not any more.
 
     Returns:
-        It, and where it was flown: the set's own place if its terms are not flown.
+        It, its evidence over what the set leaves alone, and where it was flown: the set's own place if its terms are
+        not flown.
     """
     terms = flying.candidates.terms
     rows = [1 + j for j, term in enumerate(terms) if term.component == unknown.component]
@@ -74,13 +75,17 @@ def flown_unknown(flying: Flying, fit: SetFit, flown: Bent, unknown: UnknownFit)
     if not rows or unknown.component.endswith("_path"):
         return unknown, flown.point
     bent = bring(flying, fit, flown, rows, np.ones(len(rows)))
-    after, misfit = bent.left.reduced(), float(before[0, 0])
+    # slopes anew: where numbers went as far as they may for want of the terms, these lead but half the way back
+    point = replace(flying.point(fit, bent.point.sizes, bent.point.nuisances), weights=bent.point.weights)
+    bent = bring(flying, fit, Bent(point, flying.left_over(fit, point)), rows, np.ones(len(rows)))
+    left = bent.left.reduced()
     weights = np.array([bent.point.weights.get(terms[row - 1].row, 0.0) for row in rows])
-    linear, there = (gain(left[np.ix_(rows, rows)], left[rows, 0], left.diagonal()[rows], misfit, (1.0,), flown=at,
-                          closer=misfit - float(left[0, 0]))
-                     for left, at in ((before, np.zeros(len(rows))), (after, weights)))  # fmt: skip
-    return replace(unknown, log_evidence=unknown.log_evidence + there.gained[1] - linear.gained[1],
-                   misfit=unknown.misfit + there.left[1] - linear.left[1], weights=dict(bent.point.weights)), bent.point
+    left[:, 0] -= left[:, rows] @ weights
+    left[0] -= weights @ left[rows]
+    linear, there = (next(u for u in fit_unknown_left(inner, flying.candidates) if u.component == unknown.component)
+                     for inner in (before, left))  # fmt: skip
+    better = there.log_evidence - linear.log_evidence + 0.5 * float(before[0, 0] - left[0, 0])
+    return replace(there, log_evidence=unknown.log_evidence + better), bent.point
 
 
 def flown_squares(fit: SetFit, flown: Bent) -> tuple[list[float], list[float]]:

@@ -43,6 +43,7 @@ from sim2real.posterior.sets import SetFit
 from sim2real.signatures.courses import Remainder
 from sim2real.signatures.tempering import noise
 
+TRIED = 3  # components whose generic terms are flown beside nothing
 MOST = 12  # explanations flown again; what looks better then and has not been flown is not believed
 PART = 0.1  # of what a set is more probable than nothing (in logarithms), that an effect flown for its sake is alone
 TAKEN = 4.0  # whitened square above luck, that generic terms take of what leaves room for a companion (assumed)
@@ -230,20 +231,29 @@ class _Search:
                 left = given(left, *at_liberty.room(Bent(self.points[i], remainder)), SHARES[k - 1])
                 fits = fit_unknown_left(left, self.flying.candidates)
                 fits = split(known.fit, known.form, fits, self.nothing, self.linear.raw, at_liberty.explained())[1]
+        fits, flown = self._flown(i, fits) if not known.effects else (fits, {})
         fits = [u for u in fits if not self._named(u, known)]
         if not fits:
             return []
-        best, settled = max(fits, key=lambda u: u.log_evidence), self._where(i)
-        if not known.effects and best.weights and best.log_evidence > WORTH:
-            flown, point = flown_unknown(self.flying, known.fit, Bent(self.points[i], self.left[i]), best)
-            fits = [flown if u is best else u for u in fits]
-            best = max(fits, key=lambda u: u.log_evidence)
-            settled = point.settled if best is flown else settled
+        best = max(fits, key=lambda u: u.log_evidence)
+        settled = flown.get(best.component, self._where(i))
         more = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
         prior = np.log(P_BESIDE / (1.0 - P_NONE)) + known.log_prior if known.effects else np.log(P_UNKNOWN)
         return [Hypothesis(known.fit, best, float(prior), known.log_evidence + gained + more,
                            Form((0.0,), (best.left,), self._at_liberty(known.fit).free(remainder, best)),
                            settled=settled)]
+
+    def _flown(self, i: int, fits: Iterable[UnknownFit]) -> tuple[list[UnknownFit], dict[str, Settled]]:
+        """Generic terms beside nothing, the best of them flown if they are worth it; and where these settled.
+
+        The best few where some of the model's own numbers went as far as they may: perhaps for want of them.
+        """
+        fits, settled = sorted(fits, key=lambda u: -u.log_evidence), dict[str, Settled]()
+        for j, u in enumerate(fits[: TRIED if len(self.points[i].held) else 1]):
+            if u.weights and u.log_evidence > WORTH:
+                fits[j], point = flown_unknown(self.flying, self.found[i].fit, Bent(self.points[i], self.left[i]), u)
+                settled[u.component] = point.settled
+        return fits, settled
 
     def _where(self, i: int) -> Settled:
         """Nuisances where a flown set settled, in its other form if it was flown in one."""
@@ -256,18 +266,15 @@ class _Search:
         """
         raw = self.linear.raw
         if not beside.effects:
-            linear = self.before[self.nothing_at_all()].fit.misfit  # what was not flown is compared with what was not
-            return any(is_home(h, unknown, self.nothing - unknown.misfit,
-                               self._explained(h, unknown) if i in self.points else linear - h.fit.misfit, raw)
+            told = self.own_numbers - unknown.misfit
+            return any(is_home(h, unknown, told, self.own_numbers - self._by_numbers(i), raw)
                        for i, h in enumerate(self.found))  # fmt: skip
         return any(alike(h.fit, unknown, raw) > SHAPE for h in self.found
                    if len(h.effects) == 1 and h.unknown is None and h.effects[0] not in beside.effects)  # fmt: skip
 
-    def _explained(self, h: Hypothesis, unknown: UnknownFit) -> float:
-        """Whitened square that a flown effect explains: of what generic terms do, no more than beside free numbers."""
-        told, more = self.nothing - unknown.misfit, h.fit.misfit - unknown.misfit
-        beside_numbers = told * (1.0 - more / max(self.own_numbers - unknown.misfit, 1e-9))
-        return min(self.nothing - h.fit.misfit, beside_numbers) if more > 0.0 else self.nothing - h.fit.misfit
+    def _by_numbers(self, i: int) -> float:
+        """Whitened square that a set leaves beside the model's own numbers, however far these would have to go."""
+        return self.left[i].unbounded() if i in self.left else self.found[i].fit.misfit
 
     def posterior(self) -> Posterior:
         """All hypotheses with their probabilities.
@@ -288,4 +295,5 @@ class _Search:
         told = forgive(kept, self.nothing, least, bare, flown)
         bound = max(told[k].log_posterior for k in flown)
         told = [h for k, h in enumerate(told) if k in flown or h.unknown is not None or h.log_posterior <= bound]
-        return replace(self.linear, hypotheses=normalised(told, 0.0), bare=bare)
+        best, *_ = hypotheses = normalised(told, 0.0)
+        return replace(self.linear, hypotheses=hypotheses, bare=bare if best.unknown is None else min(bare, best.left))

@@ -96,7 +96,8 @@ class Posterior:
         reduced: inner products, nuisances integrated out.
         tempering: what the evidence was divided by.
         raw: inner products of all rows, nuisances where they are.
-        bare: whitened square that is left where the best flown set may do whatever it likes at home.
+        bare: whitened square that is left where the best flown set may do whatever it likes at home, or beside what is
+            unknown, where that is likeliest.
         courses: free courses of time, by component.
     """
 
