@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from test_withheld_score import answer, key, write
 
 from icing_env.errors import InputError
-from testbed.benchmarks.diagnosis import tables
+from testbed.benchmarks.diagnosis import removals, tables
 from testbed.benchmarks.failures import failures
 from testbed.benchmarks.pooled_sets import pooled
 from testbed.benchmarks.published_sets import publish, unpack
@@ -113,6 +113,24 @@ def test_a_published_set_is_scored_as_the_folder_was(tmp_path):
     for sealed in (folders[0] / "keys").iterdir():
         assert (restored / "keys" / sealed.name).read_bytes() == sealed.read_bytes()
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["a.tar.xz"]
+
+
+def test_effects_left_out_of_the_library_are_published_and_scored_too(tmp_path):
+    folder = a_set(tmp_path / "a", 2, 1)
+    left_out = removals(folder / "keys")
+    assert list(left_out.values()) == [RIGHT]
+    (folder / "answers_without").mkdir()
+    for name in left_out:
+        told = json.dumps(answer([WRONG]) | {"provenance": {"sources": "one solver"}})
+        (folder / "answers_without" / f"{name}.json").write_text(told)
+    publish(folder, tmp_path / "a.tar.xz")
+    found = pooled([tmp_path / "a.tar.xz"])
+    assert found == pooled([folder])
+    assert found["by_tier"]["without"]["cases"] == 1 and found["by_tier"]["without"]["right"] == 0.0
+    assert [one["tier"] for one in found["failures"]] == ["single", "left out"]
+    (folder / "answers_without" / f"{name}.json").rename(folder / "answers_without" / "other.json")
+    with pytest.raises(InputError, match=f"answers_without/{name}.json"):
+        pooled([folder])
 
 
 def test_keys_changed_before_publishing_are_told(tmp_path):

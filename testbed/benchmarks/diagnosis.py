@@ -63,7 +63,7 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
     there = [out / f"answers_{rival}" for rival in RIVALS if any((out / f"answers_{rival}").glob("*.json"))]
     found = score(out / "answers", out / "keys", out / "refly", out / "answers_without", *there)
     found |= {"set": kind_of(committed), "sources": committed["sources"],
-              "failures": failures(out / "answers", out / "keys")}  # fmt: skip
+              "failures": failures(out / "answers", out / "keys", out / "answers_without")}  # fmt: skip
     if ledger is not None:
         enter(ledger, found, out)
     if published is not None:

@@ -8,13 +8,17 @@ from typing import Any
 from testbed.withheld.files import read_json
 from testbed.withheld.score import RIGHT, Case, flat
 
-TIERS = ("single", "pair", "unknown", "null", "faults")
+LEFT_OUT = "left out"  # tier of single effects that were left out of the library
+TIERS = ("single", LEFT_OUT, "pair", "unknown", "null", "faults")
 HEADERS = {"tier": "left", "sigma_w, m/s": "right", "D": "right", "can be told": "left", "truth": "left",
            "answer": "left"}  # fmt: skip
 
 
-def failures(answers: Path, keys: Path) -> list[dict[str, Any]]:
+def failures(answers: Path, keys: Path, without: Path | None = None) -> list[dict[str, Any]]:
     """Every case that was answered wrongly, by tier, the farthest from what it was taken for first.
+
+    Args:
+        without: answers to single effects that were left out of the library, if there are any.
 
     Returns:
         case, tier, sigma_w (m/s), D (to none; of unknown effects to the nearest pair), can_be_told (singles and pairs),
@@ -29,6 +33,11 @@ def failures(answers: Path, keys: Path) -> list[dict[str, Any]]:
             found.append({"case": path.stem, "tier": key["tier"], "sigma_w": key["sigma_w"], "D": near,
                           "can_be_told": case["identifiable"] if key["tier"] in ("single", "pair") else None,
                           "truth": _truth(key), "answer": _told(answer)})  # fmt: skip
+    for path in sorted(without.glob("*.json")) if without is not None else ():
+        answer, key = read_json(path), read_json(keys / path.name)
+        if not flat(answer, key)["open"]:
+            found.append({"case": path.stem, "tier": LEFT_OUT, "sigma_w": key["sigma_w"], "D": key["D_none"],
+                          "can_be_told": None, "truth": _truth(key), "answer": _told(answer)})  # fmt: skip
     return sorted(found, key=lambda one: (TIERS.index(one["tier"]), not one["can_be_told"], -(one["D"] or 0.0)))
 
 

@@ -8,9 +8,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from icing_env.errors import InputError
-from testbed.benchmarks.diagnosis import kind_of, untouched
+from testbed.benchmarks.diagnosis import kind_of, removals, untouched
 from testbed.benchmarks.failures import failures
-from testbed.benchmarks.published_sets import PARTS, unpack
+from testbed.benchmarks.published_sets import PARTS, WITHOUT, unpack
 from testbed.withheld.files import read_json
 from testbed.withheld.refly import FLOWN_AGAIN
 from testbed.withheld.score import score
@@ -34,14 +34,14 @@ def pooled(places: Sequence[Path]) -> dict[str, Any]:
             if len(values) > 1:
                 told = ", ".join(f"{at}: {value}" for value, at in values.items())
                 raise InputError(f"--pool: sets of different {what} ({told}); give those of one solver and kind")
-        for part in PARTS:
-            (Path(name) / part).mkdir()
-            for folder in folders:
-                for path in (folder / part).glob("*.json"):
-                    if path.stem != "seed":
-                        (Path(name) / part / path.name).symlink_to(path.resolve())
-        found = score(*(Path(name) / part for part in PARTS))
-        found["failures"] = failures(Path(name) / "answers", Path(name) / "keys")
+        for part in (*PARTS, WITHOUT):
+            files = [path for folder in folders for path in (folder / part).glob("*.json") if path.stem != "seed"]
+            if files:
+                (Path(name) / part).mkdir()
+            for path in files:
+                (Path(name) / part / path.name).symlink_to(path.resolve())
+        found = score(*(Path(name) / part for part in (*PARTS, WITHOUT)))
+        found["failures"] = failures(*(Path(name) / part for part in ("answers", "keys", WITHOUT)))
     return found | sets[0]
 
 
@@ -58,6 +58,8 @@ def _whole(folder: Path, given: Path) -> dict[str, Any]:
     untouched(folder, committed, None if given == folder else given)
     wanted = {part: [name for name in committed["cases"] if part != "refly" or _flown_again(folder, name)]
               for part in ("answers", "refly")}  # fmt: skip
+    if any((folder / WITHOUT).glob("*.json")):
+        wanted[WITHOUT] = list(removals(folder / "keys"))
     lacking = [f"{part}/{name}.json" for part, names in wanted.items() for name in names
                if not (folder / part / f"{name}.json").is_file()]  # fmt: skip
     if lacking:

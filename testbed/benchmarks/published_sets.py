@@ -18,8 +18,9 @@ from icing_env.errors import InputError
 from testbed.withheld.files import write_text
 
 PARTS = ("answers", "keys", "refly")
+WITHOUT = "answers_without"  # to single effects left out of the library: a part of sets where that was asked
 DIGITS = 6
-MEMBER = re.compile(rf"manifest\.json|(?:{'|'.join(PARTS)})/\w+\.json")
+MEMBER = re.compile(rf"manifest\.json|(?:{'|'.join((*PARTS, WITHOUT))})/\w+\.json")
 LARGEST = 10**7  # bytes of one member
 
 
@@ -28,8 +29,9 @@ def publish(folder: Path, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}")
     with tarfile.open(part, "w:xz") as archive:
-        for member in [folder / "manifest.json", *(f for p in PARTS for f in sorted((folder / p).glob("*.json")))]:
-            answer = member.parent.name == "answers"
+        parts = [f for part in (*PARTS, WITHOUT) for f in sorted((folder / part).glob("*.json"))]
+        for member in [folder / "manifest.json", *parts]:
+            answer = member.parent.name in ("answers", WITHOUT)
             content = _shortened(member) if answer else member.read_bytes()
             told = tarfile.TarInfo(str(member.relative_to(folder)))
             told.size = len(content)
