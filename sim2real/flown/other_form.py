@@ -15,7 +15,7 @@ from icing_env.record import FloatArray
 from sim2real.flown.points import Flying
 from sim2real.flown.steps import Point, bounded_step, rooms, size_steps
 from sim2real.posterior.form import WORTH, Form
-from sim2real.posterior.generic import UnknownFit, fit_unknown_left
+from sim2real.posterior.generic import UnknownFit, fit_unknown_left, moved
 from sim2real.posterior.home_terms import gain
 from sim2real.posterior.sets import SetFit
 from sim2real.signatures.courses import Remainder
@@ -78,10 +78,8 @@ def flown_unknown(flying: Flying, fit: SetFit, flown: Bent, unknown: UnknownFit)
     # slopes anew: where numbers went as far as they may for want of the terms, these lead but half the way back
     point = replace(flying.point(fit, bent.point.sizes, bent.point.nuisances), weights=bent.point.weights)
     bent = bring(flying, fit, Bent(point, flying.left_over(fit, point)), rows, np.ones(len(rows)))
-    left = bent.left.reduced()
     weights = np.array([bent.point.weights.get(terms[row - 1].row, 0.0) for row in rows])
-    left[:, 0] -= left[:, rows] @ weights
-    left[0] -= weights @ left[rows]
+    left = moved(bent.left.reduced(), rows, -weights)
     linear, there = (next(u for u in fit_unknown_left(inner, flying.candidates) if u.component == unknown.component)
                      for inner in (before, left))  # fmt: skip
     better = there.log_evidence - linear.log_evidence + 0.5 * float(before[0, 0] - left[0, 0])

@@ -49,20 +49,21 @@ def beside(reduced: FloatArray, bank: Bank, fit: SetFit, slopes: list[dict[int, 
             move by its own uncertainty, no farther.
     """
     rows, weights = list(fit.weights or {}), np.array(list((fit.weights or {}).values()))
-
-    def moved(inner: FloatArray) -> FloatArray:
-        inner[:, 0] += inner[:, rows] @ weights
-        return inner
-
-    out = reduced.copy()
-    out[0] += weights @ reduced[rows]
-    out = moved(out)
+    out = moved(reduced, rows, weights)
     if not slopes:
         return out
     onto = np.array([np.array(list(slope.values())) @ reduced[list(slope)] for slope in slopes])
     inner = np.array([onto[:, list(slope)] @ np.array(list(slope.values())) for slope in slopes]).T
-    onto = moved(onto)
+    onto[:, 0] += onto[:, rows] @ weights
     return np.asarray(out - onto.T @ np.linalg.solve(inner + 1e-2 * np.eye(len(slopes)), onto))
+
+
+def moved(inner: FloatArray, rows: Sequence[int], weights: FloatArray) -> FloatArray:
+    """Inner products with so much of some rows added to row 0."""
+    out = inner.copy()
+    out[0] += weights @ inner[rows]
+    out[:, 0] += out[:, rows] @ weights
+    return out
 
 
 def _by_timing(terms: Sequence[Term], T: FloatArray, t: FloatArray) -> float:

@@ -68,8 +68,9 @@ _Y = columns(MEASUREMENT, MEASURED[:11])
 _FELT = np.array([MEASURED.index(c) for c in ("ax", "ay", "az")])
 _PHI = int(columns(MEASUREMENT, ("phi",))[0])
 _SURFACE, _ASKED = columns(STATE, SURFACES), columns(COMMAND, SURFACES)
-_FLAP, _POWER_L, _POWER_R, _U, _GUST_U, _ALTITUDE = (int(c) for c in columns(
-    STATE, ("flap", "power_left", "power_right", "u", "gust_u", "altitude")))  # fmt: skip
+_U, _V, _W, _P, _Q, _R = (int(c) for c in X[:6])
+_FLAP, _POWER_L, _POWER_R, _GUST_U, _ALTITUDE = (int(c) for c in columns(
+    STATE, ("flap", "power_left", "power_right", "gust_u", "altitude")))  # fmt: skip
 _FLAP_ASKED = int(columns(COMMAND, ("flap",))[0])
 _EFFICIENCY, _STATIC, _FACTOR_L, _FACTOR_R = (int(c) for c in columns(
     PARAMETERS, ("propeller_efficiency", "propeller_static_speed", "thrust_factor_left",
@@ -103,14 +104,13 @@ def push(x: Any, state: Any, size: Any, half: Any) -> None:
     It is added before the step. What turns the aircraft would turn it by twice as much so; half of that is taken back.
     """
     x[state] += size
-    for r in range(3):
-        if state == X[3 + r]:
-            p, q, s = -half*size*(r == 0), -half*size*(r == 1), -half*size*(r == 2)
-            u, v, w = x[X[0]], x[X[1]], x[X[2]]
-            x[X[0]], x[X[1]], x[X[2]] = u + s*v - q*w, v + p*w - s*u, w + q*u - p*v
-            e0, e1, e2, e3 = x[_E0], x[_E1], x[_E2], x[_E3]
-            x[_E0], x[_E1] = e0 - 0.5*(e1*p + e2*q + e3*s), e1 + 0.5*(e0*p + e2*s - e3*q)
-            x[_E2], x[_E3] = e2 + 0.5*(e0*q + e3*p - e1*s), e3 + 0.5*(e0*s + e1*q - e2*p)
+    back = -half*size
+    p, q, r = back if state == _P else 0.0, back if state == _Q else 0.0, back if state == _R else 0.0
+    u, v, w = x[_U], x[_V], x[_W]
+    x[_U], x[_V], x[_W] = u + r*v - q*w, v + p*w - r*u, w + q*u - p*v
+    e0, e1, e2, e3 = x[_E0], x[_E1], x[_E2], x[_E3]
+    x[_E0], x[_E1] = e0 - 0.5*(e1*p + e2*q + e3*r), e1 + 0.5*(e0*p + e2*r - e3*q)
+    x[_E2], x[_E3] = e2 + 0.5*(e0*q + e3*p - e1*r), e3 + 0.5*(e0*r + e1*q - e2*p)
 
 
 @kernel
