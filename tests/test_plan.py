@@ -14,10 +14,12 @@ from icing_env.simulate import Fleet
 from icing_env.trim import trim
 from icing_env.types import MEASUREMENT_FIELDS
 from sim2real.diagnosis import diagnose
-from sim2real.library.candidates import SPREAD
+from sim2real.library.candidates import SPREAD, bank
+from sim2real.planning.manoeuvre import MANOEUVRES, distances, fly
 from sim2real.planning.plan import ALTITUDE, GUSTS, plan
 from sim2real.planning.planned import named, planned, template
-from sim2real.posterior.singles import DETECTABLE
+from sim2real.posterior.singles import DETECTABLE, INDISTINGUISHABLE
+from sim2real.signatures.whitening import FARTHEST
 from testbed.cli import _run
 
 ELEVATOR, LATERAL = "elevator doublets at 55 m/s", "aileron and rudder doublets at 60 m/s"
@@ -219,3 +221,9 @@ def test_the_command_says_what_would_show(capsys, elevator):
     assert "elevator_gearing" in printed
     assert "pitch_trim" not in printed
     assert "not excited" in printed
+
+
+def test_a_rival_that_departs_from_flight_is_no_farther_than_its_samples_allow():
+    slow = fly(template(ALTITUDE, {}), MANOEUVRES[-1])
+    apart = distances(slow, bank(), [("pitch_trim", {"delta_Cm_0": 0.05}), ("thrust_loss", {"change": -0.18})], 3.2)
+    assert INDISTINGUISHABLE < apart["pitch_trim", "thrust_loss"] < FARTHEST * slow.measured.size**0.5

@@ -21,9 +21,9 @@ from sim2real.posterior.sets import firm
 from sim2real.prediction.predictor import Predictor, held, lost
 from sim2real.records.channels import MEASURED
 from sim2real.records.reconstruct import Reconstruction
-from sim2real.signatures.evidence import FARTHEST, Evidence
+from sim2real.signatures.evidence import Evidence
 from sim2real.signatures.means import without_means
-from sim2real.signatures.whitening import SETTLE, departures
+from sim2real.signatures.whitening import FARTHEST, SETTLE, departures
 
 SHORTEST, MOST = 5.0, 12  # s of a stretch, and stretches of a record
 SHARED, BY_FLIGHT, BY_RECORD = "shared", "per_flight", "per_record"  # as the interface has them

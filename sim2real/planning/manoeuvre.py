@@ -20,7 +20,7 @@ from sim2real.prediction.kalman import gains
 from sim2real.prediction.predictor import Predictor, innovations, put
 from sim2real.records.channels import FED_BACK, MEASURED, NOISE_FLOOR
 from sim2real.records.reconstruct import Reconstruction
-from sim2real.signatures.whitening import SETTLE, whiten
+from sim2real.signatures.whitening import FARTHEST, SETTLE, whiten
 
 DURATION = 30.0  # s
 TARGET = 5.0  # distance beyond which more is worth nothing (bounded Hunter-Reiner criterion)
@@ -138,7 +138,7 @@ def distances(made: Reconstruction, bank: Bank, rivals: list[tuple[str, Mapping[
         rows[j : j + 1] = effects.with_effects(rows[j : j + 1], {name: values})
     gain = gains(made, (sigma,))[0].with_start()
     left = whiten(innovations(made, rows, gain.K)[round(SETTLE / made.dt) :], _factor(made, gain.S))
-    flat = left.transpose(0, 2, 1).reshape(-1, len(rows))
+    flat = np.clip(left.transpose(0, 2, 1).reshape(-1, len(rows)), -FARTHEST, FARTHEST)
     flat = flat - np.where(np.arange(len(rows)) > 0, flat[:, :1], 0.0)
     reduced = reduce(flat.T @ flat, bank)[1 + len(bank.nuisances) :, 1 + len(bank.nuisances) :]
     out = {}

@@ -25,11 +25,10 @@ from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
 from sim2real.signatures.means import Means
 from sim2real.signatures.response import Filter, Responses
-from sim2real.signatures.whitening import SETTLE, departures, whitening, worth_less
+from sim2real.signatures.whitening import FARTHEST, SETTLE, departures, whitening, worth_less
 
 CHUNK = 500  # samples whitened at a time
 NONE = Responses()
-FARTHEST = 1e5  # noise units: a variant that departs from flight is no nearer to the record for being a number
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from sim2real.records.channels import FED_BACK, MEASURED, NOISE_FLOOR
 from sim2real.records.reconstruct import Reconstruction
 
 SETTLE = 4.0  # s, until the predictor has forgotten how it was started
+FARTHEST = 1e5  # noise units: a variant that departs from flight is no nearer to the record for being a number
 
 
 def whitening(left: FloatArray, gain: Gain, flight: Reconstruction) -> FloatArray:
