@@ -50,7 +50,7 @@ def lateness(flights: Sequence[Reconstruction], rows: Sequence[NDArray], first: 
     for surface in SURFACES:
         there = moving(flights, rows, surface)
         moved, stated = _square(surface, first, there), _square(surface, 0, [(f, f.parameters) for f, _ in there])
-        noise, of_whole = (sum(counted(f, len(f.time) - since) for f, _ in there) for since in (first, 0))
+        noise, of_whole = (sum(counted(f, f"{surface}_path", since) for f, _ in there) for since in (first, 0))
         if there and (late := _best(moved, noise)) is not None:
             without, still = stated(np.array([0.0, late.delay]))
             left = max(still - of_whole, 0.0) / max(without - still, 1e-9)

@@ -122,9 +122,9 @@ def position_noise(flight: Reconstruction, surface: str) -> tuple[FloatArray, Fl
 def _position_noise(flight: Reconstruction, surface: str) -> tuple[FloatArray, FloatArray]:
     measured, good = flight.positions[surface], np.isfinite(flight.positions[surface])
     rate = np.gradient(np.interp(flight.time, flight.time[good], measured[good]), flight.dt)
-    least = max(POSITION_NOISE, white(measured), rounding(measured, SEVERAL))
+    least = max(POSITION_NOISE, white(measured[good]), rounding(measured, SEVERAL))
     noise = np.hypot(least, flight.timing * maximum_filter1d(np.abs(rate), AROUND))
-    return rate, noise * _weight(flight)
+    return rate, noise * _weight(_apart(flight, good))
 
 
 def of_paths(flight: Reconstruction, components: Collection[str]) -> Reconstruction:
@@ -151,13 +151,21 @@ def excess(flight: Reconstruction, parameters: NDArray) -> dict[str, float]:
     """
     out = dict.fromkeys(PATHS, 0.0)
     for component, residual, _ in path_residuals(flight, parameters):
-        out[component] += float(np.sum(residual[:, 0] ** 2)) - counted(flight, len(residual))
+        out[component] += float(np.sum(residual[:, 0] ** 2)) - counted(flight, component)
     return out
 
 
-def counted(flight: Reconstruction, samples: int) -> int:
-    """Samples of a path that count as if they were CORRELATED apart."""
-    return round(samples * min(flight.dt / CORRELATED, 1.0))
+def counted(flight: Reconstruction, component: str, first: int = 0) -> int:
+    """Samples of a path from `first` on, as many as they would be CORRELATED apart."""
+    recorded = flight.positions.get(component.removesuffix("_path"))  # power is known at every step
+    there = np.ones(len(flight.time), bool) if recorded is None else np.isfinite(recorded)
+    return round(np.count_nonzero(there[first:]) * min(_apart(flight, there) / CORRELATED, 1.0))
+
+
+def _apart(flight: Reconstruction, there: NDArray[np.bool_]) -> float:
+    """Seconds from one sample to the next, where some steps have one."""
+    steps = np.diff(np.flatnonzero(there))
+    return flight.dt * (float(np.median(steps)) if len(steps) else 1.0)
 
 
 def _differing(parameters: NDArray, names: list[str]) -> list[int]:
@@ -246,13 +254,13 @@ def _engines_left(flight: Reconstruction, lags: FloatArray) -> list[FloatArray]:
             found[1:, j] = lfilter([s], [1.0, s - 1.0], wanted[1:], zi=[(1.0 - s) * power[j]])[0]
         left = (flight.controls[f"power_{side}"][:, None] - found) / full[:, None]
         # the chart between lever and power is nobody's claim: a constant share and an offset are taken out
-        out.append(_without_line(left, lever) / (POWER_NOISE * _weight(flight)))
+        out.append(_without_line(left, lever) / (POWER_NOISE * _weight(flight.dt)))
     return out
 
 
-def _weight(flight: Reconstruction) -> float:
-    """By which noise is multiplied so that samples count as if they were CORRELATED apart."""
-    return float(np.sqrt(max(CORRELATED / flight.dt, 1.0)))
+def _weight(apart: float) -> float:
+    """By which noise is multiplied so that samples some seconds apart count as if they were CORRELATED apart."""
+    return float(np.sqrt(max(CORRELATED / apart, 1.0)))
 
 
 def _without_line(left: FloatArray, lever: FloatArray) -> FloatArray:

@@ -74,7 +74,7 @@ def _sharpest(flights: Sequence[Reconstruction], moved: Sequence[str]) -> list[f
 
 
 def _counted(flights: Sequence[Reconstruction], surface: str) -> int:
-    return sum(counted(f, int(np.isfinite(f.positions[surface]).sum())) for f in flights if moves(f, surface))
+    return sum(counted(f, f"{surface}_path") for f in flights if moves(f, surface))
 
 
 def _square(flights: Sequence[Reconstruction], surface: str, shift: float, other: float) -> float:

@@ -87,7 +87,7 @@ def compare(flight: Reconstruction, rows: NDArray, gain: Gain, factor: FloatArra
         linear: rows whose response is known and that are not flown.
     """
     found, first = flown(flight, rows, (), gain, factor, keep, linear), round(SETTLE / flight.dt)
-    samples = counted(flight, len(flight.time) - first) * len(path_residuals(flight, rows[:1]))
+    samples = sum(counted(flight, component, first) for component, _, _ in path_residuals(flight, rows[:1]))
     return replace(found, gram=found.gram + path_gram(flight, rows, terms, first), samples=found.samples + samples)
 
 
