@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,9 +14,19 @@ from numpy.typing import NDArray
 
 from icing_env import effects, scenario
 from icing_env.record import FlightRecord
+from sim2real.actuators.paths import path_residuals
 from sim2real.diagnosis import Diagnosis, diagnose
 from sim2real.library.candidates import bank
-from sim2real.over_time.by_stretch import BY_RECORD, SHARED, cut_up, random_walk, responses, ways_of
+from sim2real.over_time.by_stretch import (
+    BY_RECORD,
+    SHARED,
+    cut_up,
+    inwards,
+    random_walk,
+    responses,
+    turned,
+    ways_of,
+)
 from sim2real.over_time.varying import _or_any
 from sim2real.posterior.hypotheses import Hypothesis
 from sim2real.posterior.sets import SetFit
@@ -103,6 +114,28 @@ def test_stretches_together_are_the_whole(name, parameter, size):
     assert np.linalg.norm(whole) > 0.0
 
 
+def test_a_path_is_judged_to_its_last_sample_by_the_stretch_that_it_was_read_in():
+    flight = reconstruct(flown(3))
+    evidence = gather(flight, replace(bank(), families=(), terms=(), size=1, nuisances=()))
+    rows = effects.with_effects(np.repeat(flight.parameters, 2), {"elevator_offset": {"angle": np.array([0.0, 0.01])}})
+    cut, n = cut_up(flight), len(flight.time)
+    _, paths, _ = responses(evidence, np.tile(rows, (len(cut) - 1, 1)), cut)
+    assert next(name for name, _, _ in path_residuals(flight, rows)) == "elevator_path"
+    moved = paths[:n, 1:] != 0.0
+    assert np.array_equal(moved.sum(axis=1), (np.arange(n) > cut[0]).astype(int))
+    for stretch, (start, end) in enumerate(pairwise(cut)):
+        assert moved[start + 1 : end + 1, stretch].all()
+
+
+def test_a_step_at_the_end_of_a_range_is_taken_inwards_and_means_the_same():
+    sizes = np.array([[0.98, 0.1], [0.5, 0.0]])
+    signs = inwards(sizes, np.array([0.04, -0.02]), 0.0, 1.0)
+    assert signs.tolist() == [[-1.0, 1.0], [1.0, -1.0]]
+    forwards = np.random.default_rng(2).standard_normal((30, 7))  # what is left, two nuisances, four steps
+    flown = forwards * np.r_[np.ones(3), signs.ravel()]
+    np.testing.assert_allclose(turned(flown.T @ flown, signs), forwards.T @ forwards)
+
+
 def test_a_random_walk_departs_from_its_mean():
     walk = random_walk(9)
     assert walk.shape == (9, 8)
@@ -122,7 +155,8 @@ def test_ways_to_depart_are_those_that_the_records_allow():
 def test_ice_is_the_water_met():
     record = flown(3)
     flight = reconstruct(record)
-    assert not _variable(flight, "ice").any() or "lwc" in record.channels
+    dry = {name: values for name, values in record.channels.items() if name != "lwc"}
+    assert not _variable(reconstruct(replace(record, channels=dry)), "ice").any()
     water = np.where(record.time > record.time[0] + 10.0, 5e-4, 0.0)
     wet = replace(record, channels=dict(record.channels) | {"lwc": water})
     met = _variable(reconstruct(wet), "ice")

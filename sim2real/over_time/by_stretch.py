@@ -81,8 +81,9 @@ def _of_paths(flight: Reconstruction, rows: NDArray, cut: NDArray[np.intp]) -> F
         whole[:, which] = residual
         path = np.zeros((len(residual), 1 + k * len(rows)))
         for s, (start, end, own) in enumerate(_stretches(cut, k)):
-            now = whole[start:end, s * (1 + k) : (s + 1) * (1 + k)]
-            path[start:end, 0], path[start:end, own] = now[:, 0], now[:, 1:] - now[:, :1]
+            read = slice(start + 1, end + 1)  # after the steps of the stretch
+            now = whole[read, s * (1 + k) : (s + 1) * (1 + k)]
+            path[read, 0], path[read, own] = now[:, 0], now[:, 1:] - now[:, :1]
         found.append(path)
     return np.concatenate(found)
 
@@ -121,6 +122,19 @@ def products(made: Sequence[tuple[FloatArray, FloatArray, FloatArray]], precisio
     gram[0, 1 : 1 + n] = gram[1 : 1 + n, 0]
     gram[0, 0] += nuisances @ precision @ nuisances
     return gram
+
+
+def inwards(sizes: FloatArray, steps: FloatArray | float, low: FloatArray | float,
+            high: FloatArray | float) -> FloatArray:  # fmt: skip
+    """1 where a step from a size stays within its range, -1 where the step is to be taken the other way."""
+    there = sizes + steps
+    return np.where((there > high) | (there < low), -1.0, 1.0)
+
+
+def turned(gram: FloatArray, signs: FloatArray) -> FloatArray:
+    """Inner products as if every step, the last rows, had been taken forwards; responses are linear that near."""
+    back = np.r_[np.ones(len(gram) - signs.size), signs.ravel()]
+    return gram * back * back[:, None]
 
 
 def without(gram: FloatArray, steps: FloatArray) -> FloatArray:

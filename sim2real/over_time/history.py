@@ -22,7 +22,19 @@ from sim2real.closing.discrepancy import moved_by
 from sim2real.closing.remedy import Remedy
 from sim2real.flown.steps import ranges, size_steps
 from sim2real.library.candidates import Bank, shifted
-from sim2real.over_time.by_stretch import SHARED, Way, cut_up, gaussian, products, responses, spans, ways, without
+from sim2real.over_time.by_stretch import (
+    SHARED,
+    Way,
+    cut_up,
+    gaussian,
+    inwards,
+    products,
+    responses,
+    spans,
+    turned,
+    ways,
+    without,
+)
 from sim2real.posterior.hypotheses import Posterior
 from sim2real.posterior.sets import SetFit
 from sim2real.records.reconstruct import Reconstruction
@@ -87,12 +99,14 @@ def histories(flights: Sequence[Reconstruction], candidates: Bank, evidences: Se
     estimate, steps = np.array(fit.estimate), size_steps(fit, np.array(fit.estimate))
     low, high = (np.array([getattr(f.parameter, end) for f in fit.families]) for end in ("low", "high"))
     tried, found = ways(flights, cuts), list[tuple[Way, FloatArray, FloatArray]]()
-    sizes = np.tile(estimate, (sum(counts), 1))
+    sizes, at = np.tile(estimate, (sum(counts), 1)), np.cumsum(counts)[:-1]
     for _ in range(ROUNDS):
-        rows = [_stepped(flight, candidates, nuisances, fit, change, own, steps)
-                for flight, own in zip(flights, np.split(sizes, np.cumsum(counts)[:-1]), strict=True)]
+        signs = inwards(sizes, steps, low, high)
+        rows = [_stepped(flight, candidates, nuisances, fit, change, own, steps * sign)
+                for flight, own, sign in zip(flights, np.split(sizes, at), np.split(signs, at), strict=True)]
         made = each(responses, evidences, rows, cuts)
-        gram = projected(products(made, baseline.precision, nuisances, posterior.tempering), 1 + len(nuisances))
+        gram = turned(products(made, baseline.precision, nuisances, posterior.tempering), signs)
+        gram = projected(gram, 1 + len(nuisances))
         gram = without(gram, ((sizes - estimate) / steps).ravel())
         found = [_likeliest(gram, m, fit, tried) for m in range(len(steps))]
         sizes = np.clip(estimate + np.column_stack([departure for _, departure, _ in found]), low, high)
@@ -108,9 +122,10 @@ def histories(flights: Sequence[Reconstruction], candidates: Bank, evidences: Se
 
 def _stepped(flight: Reconstruction, candidates: Bank, nuisances: FloatArray, fit: SetFit, change: Remedy,
              sizes: FloatArray, steps: FloatArray) -> NDArray:  # fmt: skip
-    """PARAMETERS with the explanation at `sizes` [S, k] by stretch: as it is, then a step of each [S, 1 + k]."""
+    """PARAMETERS with the explanation at `sizes` [S, k] by stretch: as it is, then a step [S, k] of each [S, 1 + k]."""
     base = shifted(flight.parameters, candidates.nuisances, nuisances, flight.power_from)
-    moved = sizes[:, None, :] + np.vstack([np.zeros_like(steps), np.diag(steps)])
+    steps = np.concatenate([np.zeros_like(steps)[:, None], steps[:, None] * np.eye(len(fit.families))], axis=1)
+    moved = sizes[:, None, :] + steps
     values: dict[str, dict[str, float | FloatArray]] = {name: {**own} for name, own in change.values.items()}
     for m, family in enumerate(fit.families):
         values[family.effect.name][family.parameter.name] = moved[:, :, m].ravel()

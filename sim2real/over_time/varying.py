@@ -23,7 +23,17 @@ from sim2real.baseline.references import Baseline
 from sim2real.flown.companions import CERTAIN
 from sim2real.flown.steps import FARTHEST
 from sim2real.library.candidates import Bank, Family, shifted, unbroken
-from sim2real.over_time.by_stretch import Way, cut_up, gaussian, products, responses, ways, without
+from sim2real.over_time.by_stretch import (
+    Way,
+    cut_up,
+    gaussian,
+    inwards,
+    products,
+    responses,
+    turned,
+    ways,
+    without,
+)
 from sim2real.over_time.history import SPREADS
 from sim2real.posterior.any_delay import is_delay
 from sim2real.posterior.form import forgiven
@@ -164,14 +174,16 @@ class _Flying:
     def fitted(self, family: Family, centre: FloatArray) -> _Fit:
         """Sizes of one effect for every stretch, by Gauss and Newton from none, each step flown anew."""
         p, n, counts = family.parameter, len(centre), [len(cut) - 1 for cut in self.cuts]
+        at = np.cumsum(counts)[:-1]
         sizes, nuisances = np.full(sum(counts), p.neutral), np.clip(centre, -FARTHEST, FARTHEST)
         step = STEP * (p.typical or 0.25 * (p.high - p.low))
         for _ in range(ROUNDS):
-            own = np.split(sizes, np.cumsum(counts)[:-1])
-            rows = [_rows(flight, self.candidates, nuisances, family, s, step)
-                    for flight, s in zip(self.flights, own, strict=True)]
+            own = np.split(sizes, at)
+            signs = inwards(sizes, step, p.low, p.high)
+            rows = [_rows(flight, self.candidates, nuisances, family, s, step * sign)
+                    for flight, s, sign in zip(self.flights, own, np.split(signs, at), strict=True)]
             made = each(responses, self.evidences, rows, self.cuts)
-            gram = products(made, self.baseline.precision, nuisances, self.tempering)
+            gram = turned(products(made, self.baseline.precision, nuisances, self.tempering), signs)
             found = _best(gram, n, (sizes - p.neutral) / step, self.tried)
             now = np.clip(p.neutral + step * found.sizes, p.low, p.high)
             asked = gram[1 : 1 + n, 0] + gram[1 : 1 + n, 1 + n :] @ (now - sizes) / step
@@ -181,10 +193,10 @@ class _Flying:
 
 
 def _rows(flight: Reconstruction, candidates: Bank, nuisances: FloatArray, family: Family, sizes: FloatArray,
-          step: float) -> NDArray:
-    """PARAMETERS in every stretch with the effect at its size there, and a step beside it [S, 2]."""
+          steps: FloatArray) -> NDArray:
+    """PARAMETERS in every stretch with the effect at its size there, and a step [S] beside it [S, 2]."""
     base = shifted(flight.parameters, candidates.nuisances, nuisances, flight.power_from)
-    both = np.stack([sizes, sizes + step], axis=1)
+    both = np.stack([sizes, sizes + steps], axis=1)
     values: dict[str, dict[str, float | FloatArray]] = {
         family.effect.name: {**family.effect.neutral(), family.parameter.name: both.ravel()}}
     return effects.with_effects(np.repeat(base, both.size), values).reshape(both.shape)
