@@ -11,7 +11,7 @@ import numpy as np
 
 from icing_env import aircraft, effects
 from icing_env.errors import InputError, nearest
-from icing_env.record import FlightRecord
+from icing_env.record import FlightRecord, FloatArray
 from sim2real.actuators.surfaces import placed
 from sim2real.actuators.timing import in_step
 from sim2real.answer import credible, describe, detection_limits, judge, problems, provenance, ranked
@@ -146,7 +146,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
                           "after": gap.g(found.training.after, found.training.alone),
                           "after_effects_alone": gap.g(found.effects_alone.after, found.effects_alone.alone)},
              "held_out": gap.held_out(tested, seed, less)} | rungs,
-        next_manoeuvre=_next(flights[0], candidates, posterior, hypotheses, sigma),
+        next_manoeuvre=_next(flights[0], candidates, posterior, hypotheses, sigma, baseline.precision),
         resimulate=resimulation(change, found.training, flights, evidences),
         data_problems=problems((*flights, *others)),
         provenance=provenance(flights, others, evidences, without, len(reference), seed)
@@ -171,11 +171,12 @@ def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, s
 
 
 def _next(flight: Reconstruction, candidates: Bank, posterior: Posterior, hypotheses: list[dict[str, Any]],
-          sigma: float) -> dict[str, Any] | None:
+          sigma: float, precision: FloatArray) -> dict[str, Any] | None:
     inside = [hypotheses[i] for i in credible([h["probability"] for h in hypotheses])]
     names = list(dict.fromkeys(name for h in inside for name in h["effects"]))
     if len(names) == 1:
-        names += [n for n in posterior.classes[names[0]] if n not in names]
+        held = {n for h in hypotheses for n in h["effects"]}  # of a class, those that were flown
+        names += [n for n in posterior.classes[names[0]] if n in held and n not in names]
     rivals = {n: values_of(posterior.leading(n))[n] for n in names}
     likely = posterior.effects
-    return next_manoeuvre(flight, candidates, rivals, {n: max(likely[n], 1e-3) for n in names}, sigma)
+    return next_manoeuvre(flight, candidates, rivals, {n: max(likely[n], 1e-3) for n in names}, sigma, precision)

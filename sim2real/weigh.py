@@ -64,11 +64,11 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
             break
     progress("looking for what no generic term follows")
     found.weigh_courses()
-    untestable |= found.quiet
     if leading(found.posterior):
         progress("flying the leading explanations where they were fitted")
         found.refine()
         found.refine_anew(progress)
+    untestable |= found.quiet
     posterior = varying(flights, candidates, found.evidences, baseline, found.posterior, found.centre)
     return found.evidences, replace(posterior, hypotheses=doubted(normalised(posterior.hypotheses)))
 
@@ -112,7 +112,7 @@ class _Weighing:
     def __init__(self, flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline,
                  untestable: dict[str, str], centre: FloatArray) -> None:
         self.flights, self.candidates, self.baseline = flights, candidates, baseline
-        self.untestable, self.centre = untestable, centre
+        self.untestable, self.centre = dict(untestable), centre
         self.known: list[Gain] | None = None
         self.quiet = dict(untestable)
         self.evidences: list[Evidence] = []

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from icing_env import scenario
+from icing_env.effects import LIBRARY
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, RecordMeta, write
 from sim2real.actuators.timing import in_step
@@ -20,7 +21,8 @@ from sim2real.library.sizes import piece_prior, size_prior
 from sim2real.prediction.kalman import gains, linearise
 from sim2real.prediction.predictor import innovations
 from sim2real.records.channels import FED_BACK
-from sim2real.records.reconstruct import reconstruct, unfiltered
+from sim2real.records.reconstruct import SHORTEST, reconstruct, unfiltered
+from sim2real.signatures.whitening import SETTLE
 from testbed.cli import _run
 from testbed.commands.diagnose import answer
 from testbed.flight import fly
@@ -105,8 +107,17 @@ def test_the_answer_has_its_form():
                                               "after_effects_alone", "closure_effects_alone", "worst_channel",
                                               "by_channel"}  # fmt: skip
     tested = {e for h in result["hypotheses"] for e in h["effects"]}
-    assert tested.isdisjoint({n["effect"] for n in result["not_testable"]})
-    assert set(result["detection_limits"]) == tested
+    untested = {n["effect"] for n in result["not_testable"]}
+    assert tested.isdisjoint(untested) and set(result["detection_limits"]) <= set(LIBRARY) - untested
+    assert tested | untested == set(LIBRARY) == set(result["detection_limits"]) | untested
+
+
+def test_a_record_in_which_the_filter_does_not_settle_is_refused():
+    assert SHORTEST > SETTLE
+    record = flown("alpha_bias:offset", 0.009, 3)
+    with pytest.raises(InputError, match=r"lasts 3 s; at least 5 are needed"):
+        diagnose([record.slice(0.0, 3.0)])
+    assert diagnose([record.slice(0.0, 5.2)]).verdict in ("no_gap", "explained", "unknown")
 
 
 def test_names_and_notes_of_a_record_change_nothing():

@@ -118,9 +118,9 @@ def test_three_regain_no_more_than_two_and_what_the_third_gives_reason_for():
 
 def test_no_size_is_sought_that_varies_where_there_may_be_no_gap():
     found = normalised(some([0.5, 3.0]), 0.0)
-    told = Posterior(found, {}, (), {}, np.zeros((1, 1)))
+    told = Posterior(found, {}, {}, np.zeros((1, 1)))
     assert told.best.unknown is not None and told.none > CERTAIN
-    sure = Posterior(normalised(some([0.5, 300.0]), 0.0), {}, (), {}, np.zeros((1, 1)))
+    sure = Posterior(normalised(some([0.5, 300.0]), 0.0), {}, {}, np.zeros((1, 1)))
     with pytest.raises((AttributeError, ValueError)):  # there it looks at the records
         varying([None], bank(), [], None, sure, np.zeros(0))
     assert varying([None], bank(), [], None, told, np.zeros(0)) is told

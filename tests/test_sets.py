@@ -131,9 +131,9 @@ def test_something_unknown_beside_a_set_is_what_the_set_leaves():
     w[0] = 1.0
     w[list(weights)] = list(weights.values())
     slope = dict(zip(family.rows, np.ones(len(family.rows)), strict=True))
-    left = beside(gram, candidates, fit, [])
+    left = beside(gram, fit, [])
     assert left[0, 0] == pytest.approx(w @ gram @ w)
-    projected = beside(gram, candidates, fit, [slope])
+    projected = beside(gram, fit, [slope])
     assert 0.0 <= projected[0, 0] <= left[0, 0]
 
 
@@ -144,3 +144,15 @@ def test_components_are_inclusion_probabilities():
     for component in enters_at["rudder_power"]:
         assert shares[component] >= found.effects["rudder_power"] - 1e-9
     assert all(0.0 <= p <= 1.0 for p in shares.values())
+
+
+def test_an_effect_is_seen_by_whichever_of_its_parameters_shows():
+    """Of a clean record the likeliest is a parameter that nothing excites: it fits as well as none."""
+    candidates, gram = flown({}, 5)
+    own = [f for f in candidates.families if f.effect.name == "inertia_error"]
+    shown = max(own, key=lambda f: f.parameter.name).parameter.name
+    quiet = [row for f in own if f.parameter.name != shown for row in f.rows]
+    gram[quiet], gram[:, quiet] = 0.0, 0.0
+    fits = attribute(Linear(gram, candidates, (), np.zeros((len(candidates.nuisances),) * 2))).fits
+    assert len(quiet) > 0 and fits["inertia_error"].family.parameter.name == shown
+    assert fits["inertia_error"].smallest is not None

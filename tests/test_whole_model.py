@@ -71,7 +71,7 @@ def test_the_gap_closes_on_a_record_that_was_not_used(found):
 
 def test_every_number_is_changed_as_its_effect_changes_it(records):
     flight = reconstruct(records[0])
-    posterior = Posterior((), dict.fromkeys(effects.LIBRARY), (), {}, np.zeros((1, 1)))
+    posterior = Posterior((), dict.fromkeys(effects.LIBRARY), {}, np.zeros((1, 1)))
     numbers = whole_model._numbers(flight, bank(), posterior)
     assert {"side_force", "lift_slope", "pitch_trim", "thrust_loss"} <= {n.effect for n in numbers}
     row, names = load(), [n.move.name for n in numbers]
@@ -93,7 +93,7 @@ def test_what_stretches_the_model_is_not_all():
     def told(tempering: float, settled: np.ndarray | None, left: gap.Energy = much, all_of_it: bool = True) -> bool:
         where = None if settled is None else Settled(settled, np.ones_like(settled))
         best = Hypothesis(SetFit(), None, 0.0, 0.0, settled=where)
-        found = Posterior((best,), {}, (), {}, np.zeros((1, 1)), tempering=tempering)
+        found = Posterior((best,), {}, {}, np.zeros((1, 1)), tempering=tempering)
         return whole_model.incomplete(found, left, all_of_it)
 
     assert told(3.0, None) and not told(1.0, None)
@@ -116,7 +116,7 @@ def test_numbers_that_one_pair_and_a_stretched_model_explain_are_told_too():
 
 def test_probabilities_stay_a_distribution():
     before = Posterior(normalised([Hypothesis(SetFit(), None, -0.1, 3.0), Hypothesis(SetFit(), None, -0.2, 1.0)], 0.0),
-                       {}, (), {}, np.zeros((1, 1)), tempering=20.0)
+                       {}, {}, np.zeros((1, 1)), tempering=20.0)
     whole = whole_model.WholeModel({}, SetFit(), (), {"z_force": 0.3, "y_force": 2.0}, np.zeros((0, 0)), 0.9)
     after = whole_model.with_whole_model(before, whole)
     assert sum(h.probability for h in after.hypotheses) == pytest.approx(1.0)

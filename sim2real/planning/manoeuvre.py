@@ -57,17 +57,22 @@ MANOEUVRES = (
 
 
 def next_manoeuvre(flight: Reconstruction, bank: Bank, rivals: Mapping[str, Mapping[str, float]],
-                   weights: Mapping[str, float], sigma: float) -> dict[str, object] | None:
+                   weights: Mapping[str, float], sigma: float, precision: FloatArray) -> dict[str, object] | None:
     """The manoeuvre that best separates `rivals` (effects with their values), and the pairs it separates.
 
     None where there is nothing to separate or no manoeuvre of the list separates any pair.
+
+    Args:
+        weights: probability of each.
+        sigma: gust intensity, m/s.
+        precision: prior precision of the nuisances [n, n].
     """
     names = list(rivals)[:6]
     pairs = list(combinations(names, 2))
     best: tuple[float, Manoeuvre, list[list[str]]] | None = None
     for manoeuvre in MANOEUVRES if pairs else ():
         try:
-            apart = distances(fly(flight, manoeuvre), bank, [(n, rivals[n]) for n in names], sigma)
+            apart = distances(fly(flight, manoeuvre), bank, [(n, rivals[n]) for n in names], sigma, precision)
         except InputError:  # this aircraft cannot be trimmed or stay there
             continue
         score = sum(weights[a] * weights[b] * min(apart[a, b], TARGET) ** 2 for a, b in pairs)
@@ -129,7 +134,7 @@ def flown(made: Reconstruction, start: Mapping[str, float]) -> Reconstruction:
 
 
 def distances(made: Reconstruction, bank: Bank, rivals: list[tuple[str, Mapping[str, float]]],
-              sigma: float) -> dict[tuple[str, str], float]:
+              sigma: float, precision: FloatArray | None = None) -> dict[tuple[str, str], float]:
     """Whitened distance of every pair of effects along a manoeuvre, size of the second and nuisances free."""
     rows = np.repeat(made.parameters, 1 + len(bank.nuisances) + len(rivals))
     for j, nuisance in enumerate(bank.nuisances, start=1):
@@ -140,7 +145,7 @@ def distances(made: Reconstruction, bank: Bank, rivals: list[tuple[str, Mapping[
     left = whiten(innovations(made, rows, gain.K)[round(SETTLE / made.dt) :], _factor(made, gain.S))
     flat = np.clip(left.transpose(0, 2, 1).reshape(-1, len(rows)), -FARTHEST, FARTHEST)
     flat = flat - np.where(np.arange(len(rows)) > 0, flat[:, :1], 0.0)
-    reduced = reduce(flat.T @ flat, bank)[1 + len(bank.nuisances) :, 1 + len(bank.nuisances) :]
+    reduced = reduce(flat.T @ flat, bank, precision)[1 + len(bank.nuisances) :, 1 + len(bank.nuisances) :]
     out = {}
     for i, j in combinations(range(len(rivals)), 2):
         along = reduced[i, j] ** 2 / reduced[j, j] if reduced[j, j] > 0.0 else 0.0

@@ -128,7 +128,7 @@ def attribute(linear: Linear, noise: float = np.inf, courses: Sequence[UnknownFi
         found[found.index(known)] = replace(known, form=with_terms(known.form, at_home))
         found += beside_it
     kept = normalised(forgive(found, float(reduced[0, 0]), min(least, *(h.left for h in found))), 0.0)
-    return Posterior(kept, fits, unknown_fits, ambiguity(reduced, fits, _inclusion(kept)), reduced,
+    return Posterior(kept, fits, ambiguity(reduced, fits, _inclusion(kept)), reduced,
                      raw=gram, courses=tuple(courses))
 
 
@@ -163,8 +163,9 @@ def _leading(found: Sequence[Hypothesis]) -> list[Hypothesis]:
 
 
 def _best(own: Sequence[EffectFit]) -> EffectFit:
-    """The likeliest parameter and piece of its range; the smallest size that would show is that of any piece."""
-    best = max(own, key=lambda e: e.log_evidence)
+    """The likeliest parameter of those that would show, and piece of its range; the smallest size is any piece's."""
+    shows = {e.family.parameter.name for e in own if e.smallest is not None}
+    best = max((e for e in own if not shows or e.family.parameter.name in shows), key=lambda e: e.log_evidence)
     shown = [e.smallest for e in own if e.smallest is not None and e.family.parameter is best.family.parameter]
     return replace(best, smallest=min(shown, key=lambda s: abs(s - best.family.parameter.neutral), default=None))
 
@@ -230,7 +231,7 @@ def _with_unknown(reduced: FloatArray, raw: FloatArray, bank: Bank, known: Hypot
     fits: list[UnknownFit] = list(alone)
     own: UnknownFit | None = None
     if known.effects:
-        fits = fit_unknown(beside(reduced, bank, known.fit, _slopes(known.fit)), bank)
+        fits = fit_unknown(beside(reduced, known.fit, _slopes(known.fit)), bank)
         nothing = float(reduced[0, 0])
         explained = energies(squares(known.fit, reduced), max(nothing - known.fit.misfit, 0.0))
         own, fits = split(known.fit, known.form, fits, nothing, raw, explained)

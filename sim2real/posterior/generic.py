@@ -22,7 +22,6 @@ SCALES = (0.5, 1.0, 2.0)  # sizes of generic terms, in their own unit (assumed)
 IN_STEP = 0.03  # of the unit of a channel's lag: 3 ms, by which channels are out of step for no reason (assumed)
 FEW = 6  # terms at most that are chosen from a component's one by one
 COURSE = "course"  # name of a free course of time among terms
-STEP = 1e-3  # of an effect's range, for the slope of its signature
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class UnknownFit:
         return self.misfit + len(self.terms)
 
 
-def beside(reduced: FloatArray, bank: Bank, fit: SetFit, slopes: list[dict[int, float]]) -> FloatArray:
+def beside(reduced: FloatArray, fit: SetFit, slopes: list[dict[int, float]]) -> FloatArray:
     """Inner products with row 0 the residual that a set of effects leaves, its sizes free to give way.
 
     Args:

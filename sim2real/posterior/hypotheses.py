@@ -91,7 +91,6 @@ class Posterior:
     Attributes:
         hypotheses: the most probable first.
         fits: every effect on its own.
-        unknown_fits: generic terms on their own, by component.
         classes: effects that one effect cannot be told from.
         reduced: inner products, nuisances integrated out.
         tempering: what the evidence was divided by.
@@ -103,7 +102,6 @@ class Posterior:
 
     hypotheses: tuple[Hypothesis, ...]
     fits: dict[str, EffectFit]
-    unknown_fits: tuple[UnknownFit, ...]
     classes: dict[str, tuple[str, ...]]
     reduced: FloatArray
     tempering: float = 1.0
