@@ -19,6 +19,8 @@ from sim2real.records.side_by_side import each
 from sim2real.signatures.evidence import Evidence
 from sim2real.weigh import Progress
 
+SEEDS_APART = 100_000  # from one record's synthetic windows to the next's, which have a seed each
+
 
 @dataclass(frozen=True)
 class Told:
@@ -110,5 +112,5 @@ def _told(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequen
 
 def flown_freely(flights: Sequence[Reconstruction], sigmas: Sequence[float], change: Remedy, seed: int) -> gap.Energy:
     """Energies of all records under the model and under the model changed."""
-    return gap.together(each(lambda i, f, sigma: gap.energies(f, change, sigma, seed + i, change.paths),
+    return gap.together(each(lambda i, f, sigma: gap.energies(f, change, sigma, seed + SEEDS_APART * i, change.paths),
                              range(len(flights)), flights, sigmas))

@@ -116,7 +116,8 @@ def synthetic(flight: Reconstruction, sigma: float, seed: int) -> list[Reconstru
         out.append(replace(
             flight, time=flight.time[span] - flight.time[k + 1], measured=measured, commands={},
             controls={n: v[span] for n, v in flight.controls.items()},
-            positions={n: v[span] for n, v in flight.positions.items()}, altitude=flight.altitude[span]))
+            positions={n: v[span] for n, v in flight.positions.items()}, altitude=flight.altitude[span],
+            known=None if flight.known is None else flight.known[span]))
     return out
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -75,6 +77,19 @@ def test_what_turns_all_through_a_step_turns_by_half_of_its_end(flight: Reconstr
     at, turned = STATES.index(rate), len(STATES) + ("phi", "theta").index(angle)
     assert pushed[at] - plain[at] == pytest.approx(size * flight.dt, rel=0.1)
     assert pushed[turned] - plain[turned] == pytest.approx(0.5 * size * flight.dt**2, rel=0.1)
+
+
+@pytest.mark.parametrize("rate", ["p", "q", "r"])
+def test_a_known_acceleration_turns_as_one_that_pushes(flight: Reconstruction, rate: str) -> None:
+    """Ten steps: the same flight to rounding, whichever way it is told."""
+    known, size = np.zeros((len(flight.time), 6)), np.full(len(flight.time), 0.2)
+    known[:, STATES.index(rate)] = size
+    told = Predictor(replace(flight, known=known), flight.parameters)
+    pushed = Predictor(flight, flight.parameters)
+    for one in (told, pushed):
+        one.place(0)
+    found, expected = told.fly(10), pushed.fly(10, pushes=(Push(0, rate, size, False),))
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize(("component", "moment"), [("rolling_moment", (1.0, 0.0)), ("yawing_moment", (0.0, 1.0))])

@@ -1,5 +1,6 @@
 """The evidence ladder, what a regression without physics can do, and paths flown from commands."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,6 +14,7 @@ from sim2real.actuators.paths import driven, follow
 from sim2real.closing import black_box, gap
 from sim2real.closing.remedy import Remedy
 from sim2real.diagnosis import Diagnosis, diagnose
+from sim2real.ladder import synthetic
 from sim2real.records.reconstruct import reconstruct
 from testbed.flight import fly
 
@@ -46,6 +48,30 @@ def test_the_search_closes_nothing_where_there_is_no_gap(climbed):
     assert none["effects"]
     assert none["closure"] <= 0.02
     assert none["before"] > 0.0
+
+
+def test_a_model_that_flies_to_no_numbers_agrees_with_nothing():
+    flight = reconstruct(flown("", "", 0.0, 3))
+
+    def wild(row):
+        row = row.copy()
+        row["Cm_q"] *= -5.0
+        return row
+
+    left, sound = (gap.squares(flight, change) for change in (wild, Remedy()))
+    assert np.array_equal(np.isfinite(left), np.isfinite(sound)) and np.isfinite(left).any()
+    assert np.nanmin(left.max(axis=1)) > 1e3 > np.nanmax(sound)
+
+
+def test_synthetic_pieces_keep_what_is_known_of_their_own_time():
+    flight = reconstruct(flown("", "", 0.0, 3))
+    known = np.arange(len(flight.time))[:, None] * np.ones(6)
+    pieces = synthetic(replace(flight, known=known), 0.5, 1)
+    assert len(pieces) > 1
+    for piece in pieces:
+        assert piece.known is not None and piece.known.shape == (len(piece.time), 6)
+        start = int(piece.known[0, 0])
+        np.testing.assert_array_equal(piece.altitude, flight.altitude[start : start + len(piece.time)])
 
 
 def test_without_being_asked_no_ladder_is_climbed():

@@ -90,8 +90,7 @@ def _mean_square(left: FloatArray) -> FloatArray:
 
 def by_channel(energy: FloatArray) -> dict[str, float]:
     """e_c by channel, those recorded."""
-    with np.errstate(invalid="ignore"):
-        values = np.sqrt([np.mean(c[np.isfinite(c)]) if np.isfinite(c).any() else np.nan for c in energy.T])
+    values = np.sqrt([np.mean(c[np.isfinite(c)]) if np.isfinite(c).any() else np.nan for c in energy.T])
     return {name: float(v) for name, v in zip(COMPARED, values, strict=True) if np.isfinite(v)}
 
 

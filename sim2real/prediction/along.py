@@ -255,7 +255,7 @@ def along(table: Any, controls: Any, first: Any, last: Any, measured: Any, stret
                 steer(x[i], u[i], controls[now], controls[now + 1])
                 fill(block, AT_COMMAND, j, u[i])
                 for c in range(6 if len(known) > 0 else 0):
-                    x[i, X[c]] += known[now + 1, c]*clock.dt
+                    push(x[i], X[c], known[now + 1, c]*clock.dt, 0.5*clock.dt)
                 if k % PRESENTED == 0:
                     present_aircraft(states[i], parameters[i], currents[i])
                     fill(block, AT_CURRENT, j, held[i])

@@ -21,6 +21,7 @@ LENGTH, START = 10.0, 2.0  # s
 FREE = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta")
 COMPARED = MEASURED[:12]
 ITERATIONS = 2
+FARTHEST = 100.0  # tolerances: farther off is no better than no numbers
 # What pushes the plant as it flies: told the rows and the sample each stands at, it returns what accelerometers feel of
 # it [rows, 3]. One is made for every flight, since it may remember.
 Push = Callable[[Predictor, NDArray[np.intp]], FloatArray]
@@ -107,10 +108,11 @@ def estimate_start(flight: Reconstruction, parameters: NDArray, first: NDArray[n
         y = y.reshape(rows, len(spread), steps, -1)
         left = np.nan_to_num((measured[:, :steps] - y[:, 0]) * weight)
         known = np.isfinite(measured[:, :steps])
-        J = (y[:, 1:] - y[:, :1]) * weight * known[:, None] / size[:, None, None]
-        J, r = J.reshape(rows, len(FREE), -1), left.reshape(rows, -1)
-        normal = J @ J.transpose(0, 2, 1) + np.diag(1e-2 / (10.0 * size) ** 2)
-        guess = guess + np.linalg.solve(normal, np.einsum("rfn,rn->rf", J, r)[..., None])[..., 0]
+        with np.errstate(invalid="ignore", over="ignore"):  # of a model that departs: its windows reach no numbers
+            J = (y[:, 1:] - y[:, :1]) * weight * known[:, None] / size[:, None, None]
+            J, r = J.reshape(rows, len(FREE), -1), left.reshape(rows, -1)
+            normal = J @ J.transpose(0, 2, 1) + np.diag(1e-2 / (10.0 * size) ** 2)
+            guess = guess + np.linalg.solve(normal, np.einsum("rfn,rn->rf", J, r)[..., None])[..., 0]
     return guess
 
 
@@ -130,7 +132,9 @@ def residuals(flight: Reconstruction, parameters: NDArray, windows: Windows,
     """Measured less freely simulated, in tolerances [windows, samples, channels], and the starts [windows, FREE]."""
     measured, rows = measured_windows(flight, windows), np.repeat(parameters, len(windows.first))
     start = estimate_start(flight, rows, windows.first, measured, windows.start, push)
-    return (measured - fly(flight, rows, windows.first, start, windows.length, push=push)) / _TOLERANCE, start
+    left = (measured - fly(flight, rows, windows.first, start, windows.length, push=push)) / _TOLERANCE
+    away = np.clip(np.nan_to_num(left, nan=FARTHEST), -FARTHEST, FARTHEST)  # no numbers are no agreement
+    return np.where(np.isfinite(measured), away, np.nan), start
 
 
 def null_residuals(flight: Reconstruction, parameters: NDArray, windows: Windows, start: FloatArray, sigma: float,

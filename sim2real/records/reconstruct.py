@@ -28,6 +28,7 @@ from sim2real.records.rounding import SEVERAL, rounding
 
 STILL = ("altitude", "thrust_left", "thrust_right")  # channels of which a constant reading says less than nothing
 LONGEST_STEP, SHORTEST_STEP = 0.1, 0.018  # s: records are 10 to 200 Hz; faster ones are thinned to about 50 Hz
+SHORTEST = 5.0  # s: the filter settles for the first four of them (signatures/whitening.py)
 TIMING = 0.002  # s: command and position are no better in step, nor is the actuator exactly of first order (assumed)
 T = TypeVar("T")
 LONGITUDINAL = ("airspeed", "alpha", "q", "theta", "ax", "az", "elevator")
@@ -181,6 +182,8 @@ def _steps(record: FlightRecord, notes: list[str]) -> tuple[FloatArray, float, d
     if grid.dt > LONGEST_STEP * 1.01:
         raise InputError(f"{where} has {1/grid.dt:.3g} samples/s; at least 10 are needed")
     every = max(1, round(0.02 / grid.dt)) if grid.dt < SHORTEST_STEP else 1
+    if (lasts := float(np.ptp(grid.time))) < SHORTEST:
+        raise InputError(f"{where} lasts {lasts:.3g} s; at least {SHORTEST:g} are needed")
     if every > 1:
         notes.append(f"thinned from {1/grid.dt:.0f} to {1/(grid.dt*every):.0f} samples/s")
     return grid.time[::every], grid.dt * every, {n: v[::every] for n, v in grid.values.items()}
@@ -258,8 +261,3 @@ def unfiltered(values: FloatArray, frequency: float, dt: float) -> FloatArray:
     out = values.copy()
     out[1:] = (values[1:] - (1.0 - share) * values[:-1]) / share
     return out
-
-
-def with_parameters(flight: Reconstruction, row: NDArray) -> Reconstruction:
-    """The same record over another model, its own mass, inertia and air kept."""
-    return replace(flight, parameters=row)
