@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from icing_env import effects, scenario
@@ -93,8 +93,7 @@ def test_along_a_valley_the_aircraft_stays_what_it_is(flying, name, share, seed)
     nuisances = np.clip(1.5 * np.random.default_rng(seed).standard_normal(len(NUMBERS)), -4.0, 4.0)
     (flight,), precision = flying.flights, flying.baseline.precision
     place = lowest(flight, WHOLE, precision, fit, (np.array(fit.estimate), nuisances))
-    if place is None:
-        return
+    assume(place is not None)
     sizes, moved = place
     assert moved @ moved < nuisances @ nuisances
     assert parameter.low <= sizes[0] <= parameter.high and np.abs(moved[nuisances != moved]).max() <= 5.0

@@ -141,7 +141,7 @@ class Fit:
         prior = np.diag(1.0 / np.maximum(self.spread, np.abs(self.x)) ** 2)
         self.precision = information / tempering + prior
         step = -np.linalg.solve(self.precision, slope / tempering + prior @ self.x)
-        self.x = self.x + step * min(1.0, LONGEST / max(float(np.max(np.abs(step))), LONGEST))
+        self.x = self.x + step * LONGEST / max(float(np.max(np.abs(step))), LONGEST)
         return float(np.sqrt(step @ self.precision @ step))
 
     def baseline(self, candidates: Bank) -> Baseline:

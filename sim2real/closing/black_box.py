@@ -38,7 +38,6 @@ class BlackBox:
     Attributes:
         mean, spread, low, high: of the plain features where it was fitted; beyond low and high it holds its value.
         weights: [features + 1, 6], the constant first.
-        strength: of the ridge.
     """
 
     mean: FloatArray
@@ -46,7 +45,6 @@ class BlackBox:
     low: FloatArray
     high: FloatArray
     weights: FloatArray
-    strength: float
 
     def __call__(self, now: FloatArray, before: Sequence[FloatArray]) -> FloatArray:
         """Accelerations [n, 6] at plain features `now` [n, f] with those of LAGS ago."""
@@ -71,7 +69,7 @@ def train(flights: Sequence[Reconstruction]) -> BlackBox:
     Y = np.concatenate([p[1] for p in parts])
     size = np.maximum(Y.std(axis=0), 1e-12)
     strength = min(STRENGTHS, key=lambda s: _left_out(X, Y / size, s))
-    return BlackBox(mean, spread, plain.min(axis=0), plain.max(axis=0), _ridge(X, Y, strength), float(strength))
+    return BlackBox(mean, spread, plain.min(axis=0), plain.max(axis=0), _ridge(X, Y, strength))
 
 
 def _ridge(X: FloatArray, Y: FloatArray, strength: float) -> FloatArray:

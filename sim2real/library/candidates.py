@@ -85,7 +85,6 @@ class Bank:
     families: tuple[Family, ...]
     terms: tuple[Term, ...]
     size: int
-    excluded: Mapping[str, str] = field(default_factory=dict)  # effect: why it is not tried
     clean: Mapping[str, float] = field(default_factory=dict)  # component: what terms there explain without a gap
 
     @property
