@@ -16,7 +16,7 @@ from sim2real.actuators.surfaces import placed
 from sim2real.actuators.timing import in_step
 from sim2real.answer import credible, describe, detection_limits, judge, problems, provenance, ranked
 from sim2real.baseline.references import Baseline, fit_baseline
-from sim2real.change import changed, flown_freely
+from sim2real.change import Changed, changed, flown_freely
 from sim2real.closing import gap
 from sim2real.closing.remedy import Remedy, resimulation, values_of
 from sim2real.closing.whole_model import components_with
@@ -110,7 +110,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     untestable = not_testable(flights, candidates)
     evidences, posterior = fit(flights, candidates, untestable, baseline, progress)
     found = changed(flights, candidates, evidences, baseline, posterior, seed, not (reference or simulator), progress)
-    posterior, explained, change = found.posterior, found.told.explained, found.change
+    posterior, explained = found.posterior, found.told.explained
     sizes = dict[str, History]()
     if explained is not None and explained.effects and found.whole is None:
         progress("looking at how the sizes went along the records")
@@ -118,16 +118,11 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     progress("flying what these records could have revealed")
     shown = limits(evidences, candidates, baseline, posterior.tempering, posterior.fits)
     sigma = float(np.mean([e.sigma_w for e in evidences]))
-    tested, less, rungs = None, None, dict[str, Any]()
-    if others:
-        tested = flown_freely(others, [sigma] * len(others), change, seed + 1000)
-        less = tested.after if change is found.alone else gap.of_all(others, found.alone, change.paths)
-        if climb:
-            rungs["ladder"] = ladder(flights, others, candidates, baseline, evidences, posterior, explained,
-                                     change.paths, tested, less, seed, progress)  # fmt: skip
-    places = components(posterior, {name: effect.enters_at for name, effect in effects.LIBRARY.items()})
-    if found.whole is not None:
-        places = components_with(places, found.whole)
+    tested, less = _held_out(others, found, sigma, seed) if others else (None, None)
+    rungs = dict[str, Any]()
+    if climb and tested is not None and less is not None:
+        rungs["ladder"] = ladder(flights, others, candidates, baseline, evidences, posterior, explained,
+                                 found.change.paths, tested, less, seed, progress)  # fmt: skip
     lacking = found.whole or found.told.unknown
     verdict, hypotheses = judge(posterior)
     progress("looking for what to fly next")
@@ -135,25 +130,44 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         verdict=verdict,
         hypotheses=hypotheses,
         credible_set_95=credible([h["probability"] for h in hypotheses]),
-        where={"channels": gap.by_channel(found.training.before), "components": places,
+        where={"channels": gap.by_channel(found.training.before), "components": _places(found),
                "regimes": regimes(evidences)},
         effects=[describe(name, posterior, explained, found.told.form, sizes.get(name, SAME))
                  for name, p in ranked(posterior) if p >= LISTED],
         not_testable=[{"effect": name, "why": why} for name, why in sorted(untestable.items())],
         detection_limits=detection_limits(posterior.fits, shown),
         unknown=None if lacking is None else lacking.answer(),
-        gap={"training": {"before": gap.g(found.training.before, found.training.alone),
-                          "after": gap.g(found.training.after, found.training.alone),
-                          "after_effects_alone": gap.g(found.effects_alone.after, found.effects_alone.alone)},
-             "held_out": gap.held_out(tested, seed, less)} | rungs,
+        gap={"training": _closed(found), "held_out": gap.held_out(tested, seed, less)} | rungs,
         next_manoeuvre=_next(flights[0], candidates, posterior, hypotheses, sigma, baseline.precision),
-        resimulate=resimulation(change, found.training, flights, evidences),
+        resimulate=resimulation(found.change, found.training, flights, evidences),
         data_problems=problems((*flights, *others)),
         provenance=provenance(flights, others, evidences, without, len(reference), seed)
         | {"tempering": posterior.tempering, "model": baseline.answer() if reference else None},
         seconds=time.perf_counter() - began,
-        details=Details(tuple(flights), tuple(others), tuple(evidences), posterior, change, found.training, tested),
+        details=Details(tuple(flights), tuple(others), tuple(evidences), posterior, found.change, found.training,
+                        tested),
     )
+
+
+def _held_out(others: Sequence[Reconstruction], found: Changed, sigma: float, seed: int
+              ) -> tuple[gap.Energy, FloatArray]:  # fmt: skip
+    """Held-out records before and after, and what the effects alone leave of them [windows, channels]."""
+    tested = flown_freely(others, [sigma] * len(others), found.change, seed + 1000)
+    alone = found.change is found.alone
+    return tested, tested.after if alone else gap.of_all(others, found.alone, found.change.paths)
+
+
+def _places(found: Changed) -> dict[str, float]:
+    """Where the gap enters, with the probability of it."""
+    places = components(found.posterior, {name: effect.enters_at for name, effect in effects.LIBRARY.items()})
+    return places if found.whole is None else components_with(places, found.whole)
+
+
+def _closed(found: Changed) -> dict[str, float]:
+    """The gap of the diagnosed records before, after, and with the effects alone."""
+    return {"before": gap.g(found.training.before, found.training.alone),
+            "after": gap.g(found.training.after, found.training.alone),
+            "after_effects_alone": gap.g(found.effects_alone.after, found.effects_alone.alone)}  # fmt: skip
 
 
 def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, simulator: Rollout | None

@@ -37,6 +37,7 @@ from icing_env.sensors import SENSOR_PARAMETERS
 from sim2real.prediction.predictor import Predictor, put
 from sim2real.prediction.windows import COMPARED, FREE, cut
 from sim2real.records.channels import TOLERANCE
+from sim2real.records.powers import thrust_per_power
 from sim2real.records.reconstruct import LONGITUDINAL, Inadequacy, Reconstruction, reconstruct
 
 BEGIN = 0.5  # s of the record that the start of a window is taken from
@@ -266,7 +267,6 @@ def _parameters(flight: Reconstruction, first: int) -> dict[str, float]:
 
 
 def _thrust(flight: Reconstruction, side: str) -> FloatArray:
-    """Thrust [N] of the power by the propeller's efficiency (icing_env.propulsion) at the recorded airspeed."""
-    p = flight.parameters[0]
-    per_power = p["propeller_efficiency"] / np.sqrt(flight.channel("airspeed") ** 2 + p["propeller_static_speed"] ** 2)
+    """Thrust [N] of the power at the recorded airspeed and angle of attack."""
+    per_power = thrust_per_power(flight.parameters[0], flight.channel("airspeed"), flight.channel("alpha"))
     return np.asarray(flight.controls[f"power_{side}"] * per_power)

@@ -13,6 +13,7 @@ from sim2real.library.terms import pushes
 from sim2real.prediction.along import REST, STATES
 from sim2real.prediction.predictor import Predictor, Push
 from sim2real.records.channels import MEASURED, SURFACES
+from sim2real.records.powers import thrust_per_power
 from sim2real.records.reconstruct import Reconstruction, reconstruct
 from testbed.flight import fly
 
@@ -103,6 +104,16 @@ def test_a_generic_moment_turns_the_aircraft_as_its_inertias_have_it(flight: Rec
     assert set(made) == {"p", "r"}
     np.testing.assert_allclose(made["r"] * roll, made["p"] * yaw, rtol=1e-9)
     assert made["p" if moment[0] else "r"].min() > 0.0
+
+
+def test_a_watt_pulls_as_in_the_simulator(flight: Reconstruction) -> None:
+    """Slow, at a large angle of attack: by the part of the airspeed along the propellers' axis."""
+    one = Predictor(flight, flight.parameters)
+    one.place(0)
+    one.fleet.state["u"], one.fleet.state["v"], one.fleet.state["w"] = 38.0, 0.0, 9.0
+    read = dict(zip(MEASURED, one.read()[0], strict=True))
+    per_power = thrust_per_power(flight.parameters[0], np.hypot(38.0, 9.0), np.arctan2(9.0, 38.0))
+    assert read["thrust_left"] == pytest.approx(per_power * one.fleet.state["power_left"][0], rel=1e-6)
 
 
 def test_thrust_is_read_through_the_wind(flight: Reconstruction) -> None:

@@ -14,6 +14,7 @@ from icing_env.aircraft import load
 from sim2real.baseline.references import Baseline
 from sim2real.flown.companions import without
 from sim2real.flown.points import Flying
+from sim2real.flown.steps import Places, Point
 from sim2real.flown.valleys import lowest
 from sim2real.library.candidates import Family, bank, nodes
 from sim2real.library.terms import in_common
@@ -141,3 +142,13 @@ def test_a_set_without_a_member_is_the_rest_of_it_as_it_was():
         rest = without(both, m)
         assert rest.effects == (name,) and rest.estimate == (size,) and rest.low95 == (size,)
         assert rest.covariance == pytest.approx(np.array([[1e-4]]))
+
+
+def test_a_set_begins_where_it_settled_whichever_member_is_named_first():
+    places, one, other = Places(), a_set(pitch_trim=0.0, mass_error=0.0), a_set(mass_error=0.0, pitch_trim=0.0)
+    nuisances = np.ones(3)
+    point = Point(np.array([0.01, 0.2]), nuisances, 0.0, np.zeros(2), np.eye(2), np.zeros(2))
+    places.keep(one, point)
+    assert places.begin(other, np.zeros(3))[0].estimate == (0.2, 0.01)
+    assert places.begin(other, np.zeros(3))[1] is nuisances
+    assert places.begin(a_set(pitch_trim=0.0), np.zeros(3))[0].estimate == (0.0,)

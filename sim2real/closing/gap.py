@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from icing_env.record import FloatArray
 from sim2real.actuators.paths import driven
-from sim2real.prediction.windows import COMPARED, Push, cut, null_residuals, residuals
+from sim2real.prediction.windows import COMPARED, Pusher, cut, null_residuals, residuals
 from sim2real.records.reconstruct import Reconstruction
 
 REPEATS = 20  # synthetic records behind f_c and behind the gap that no gap shows
@@ -58,7 +58,7 @@ def energies(flight: Reconstruction, change: Change, sigma: float, seed: int, pa
 
 
 def squares(flight: Reconstruction, change: Change, paths: Paths = (),
-            push: Callable[[], Push] | None = None) -> FloatArray:
+            push: Callable[[], Pusher] | None = None) -> FloatArray:
     """Mean square residual [windows, channels] of one record under a changed model.
 
     Args:

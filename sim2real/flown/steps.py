@@ -96,18 +96,18 @@ class Places:
     """Where sets settled, by their effects and parameters: what is flown again begins there."""
 
     def __init__(self) -> None:
-        self.kept: dict[tuple[tuple[str, str], ...], Place] = {}
+        self.kept: dict[frozenset[tuple[str, str]], tuple[dict[tuple[str, str], float], FloatArray]] = {}
 
     def keep(self, fit: SetFit, point: Point) -> None:
         """Remember where a set settled."""
-        self.kept[_named(fit)] = point.sizes, point.nuisances
+        self.kept[frozenset(_named(fit))] = dict(zip(_named(fit), point.sizes, strict=True)), point.nuisances
 
     def begin(self, fit: SetFit, nuisances: FloatArray) -> tuple[SetFit, FloatArray]:
         """A set with sizes, and nuisances [n], to begin from: those given where it has not settled yet."""
-        if _named(fit) not in self.kept:
+        if frozenset(_named(fit)) not in self.kept:
             return fit, nuisances
-        sizes, settled = self.kept[_named(fit)]
-        return replace(fit, estimate=tuple(sizes)), settled
+        sizes, settled = self.kept[frozenset(_named(fit))]
+        return replace(fit, estimate=tuple(sizes[name] for name in _named(fit))), settled
 
 
 def _named(fit: SetFit) -> tuple[tuple[str, str], ...]:

@@ -15,6 +15,7 @@ from icing_env.record import FloatArray
 from sim2real.library.knots import hat, knots
 from sim2real.prediction.predictor import Push
 from sim2real.records.channels import MEASURED, SURFACES, TOLERANCE
+from sim2real.records.powers import thrust_per_power
 from sim2real.records.reconstruct import Reconstruction
 
 
@@ -131,8 +132,7 @@ def _thrust_pushes(flight: Reconstruction, term: Term) -> list[Push]:
     """A share of both engines' thrust or of the left one's: felt, and read where recorded."""
     side, _, course = term.name.partition("*")
     p, sides = flight.parameters[0], ("left", "right") if side == "both" else ("left",)
-    speed = flight.channel("airspeed")
-    per_power = p["propeller_efficiency"] / np.sqrt(speed**2 + p["propeller_static_speed"] ** 2)
+    per_power = thrust_per_power(p, flight.channel("airspeed"), flight.channel("alpha"))
     out = []
     for side in sides:
         thrust = flight.controls[f"power_{side}"] * per_power

@@ -24,7 +24,7 @@ ITERATIONS = 2
 FARTHEST = 100.0  # tolerances: farther off is no better than no numbers
 # What pushes the plant as it flies: told the rows and the sample each stands at, it returns what accelerometers feel of
 # it [rows, 3]. One is made for every flight, since it may remember.
-Push = Callable[[Predictor, NDArray[np.intp]], FloatArray]
+Pusher = Callable[[Predictor, NDArray[np.intp]], FloatArray]
 _AX = COMPARED.index("ax")
 _TOLERANCE = np.array([TOLERANCE[c] for c in COMPARED])
 
@@ -52,7 +52,7 @@ def measured_windows(flight: Reconstruction, windows: Windows) -> FloatArray:
 
 
 def fly(flight: Reconstruction, parameters: NDArray, first: NDArray[np.intp], start: FloatArray, steps: int,
-        gusts: tuple[float, int] | None = None, push: Callable[[], Push] | None = None) -> FloatArray:
+        gusts: tuple[float, int] | None = None, push: Callable[[], Pusher] | None = None) -> FloatArray:
     """Fly rows freely from sample `first` of each.
 
     Args:
@@ -84,7 +84,7 @@ def fly(flight: Reconstruction, parameters: NDArray, first: NDArray[np.intp], st
     return out
 
 
-def _pushed(flown: Predictor, first: NDArray[np.intp], steps: int, push: Push) -> FloatArray:
+def _pushed(flown: Predictor, first: NDArray[np.intp], steps: int, push: Pusher) -> FloatArray:
     """Step by step, pushed before each: readings [steps, rows, channels of MEASURED]."""
     out = np.empty((steps, flown.n, len(MEASURED)))
     for k in range(steps):
@@ -95,7 +95,7 @@ def _pushed(flown: Predictor, first: NDArray[np.intp], steps: int, push: Push) -
 
 
 def estimate_start(flight: Reconstruction, parameters: NDArray, first: NDArray[np.intp], measured: FloatArray,
-                   steps: int, push: Callable[[], Push] | None = None) -> FloatArray:
+                   steps: int, push: Callable[[], Pusher] | None = None) -> FloatArray:
     """State at the start of each row [rows, FREE] that best gives the first `steps` samples of `measured`."""
     guess = _guess(flight, measured[:, : max(3, steps // 4)], first)
     rows, size = len(first), np.array([0.5, *np.full(7, 0.005)])
@@ -128,7 +128,7 @@ def _guess(flight: Reconstruction, early: FloatArray, first: NDArray[np.intp]) -
 
 
 def residuals(flight: Reconstruction, parameters: NDArray, windows: Windows,
-              push: Callable[[], Push] | None = None) -> tuple[FloatArray, FloatArray]:
+              push: Callable[[], Pusher] | None = None) -> tuple[FloatArray, FloatArray]:
     """Measured less freely simulated, in tolerances [windows, samples, channels], and the starts [windows, FREE]."""
     measured, rows = measured_windows(flight, windows), np.repeat(parameters, len(windows.first))
     start = estimate_start(flight, rows, windows.first, measured, windows.start, push)

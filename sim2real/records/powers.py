@@ -35,8 +35,7 @@ def powers(row: NDArray, values: Mapping[str, FloatArray], altitude: FloatArray,
         notes: gets what was assumed.
     """
     p = row[0]
-    forward = values["airspeed"] * np.cos(values["alpha"])
-    per_power = p["propeller_efficiency"] / np.sqrt(forward**2 + p["propeller_static_speed"] ** 2)
+    per_power = thrust_per_power(p, values["airspeed"], values["alpha"])
     if all(f"torque_{s}" in values for s in SIDES):
         rpm = {s: values.get(f"rpm_{s}", np.full(len(altitude), p["propeller_rpm"])) for s in SIDES}
         return "torque", {f"power_{s}": values[f"torque_{s}"] * rpm[s] * math.pi / 30.0 for s in SIDES}
@@ -50,6 +49,15 @@ def powers(row: NDArray, values: Mapping[str, FloatArray], altitude: FloatArray,
                             for s in SIDES}  # fmt: skip
     notes.append("thrust, torque and levers not recorded: the power that the axial acceleration asks for")
     return "balance", {f"power_{s}": 0.5 * _balancing(p, values, altitude) / per_power for s in SIDES}
+
+
+def thrust_per_power(p: NDArray, airspeed: FloatArray, alpha: FloatArray) -> FloatArray:
+    """What a watt of shaft power pulls with, N/W (icing_env.propulsion), at a recorded airspeed [m/s] and alpha (N,).
+
+    The propellers meet the part of it along the body's axis; what sideslip takes off that is left out.
+    """
+    forward = airspeed * np.cos(alpha)
+    return np.asarray(p["propeller_efficiency"] / np.sqrt(forward**2 + p["propeller_static_speed"] ** 2))
 
 
 def _spooled(wanted: FloatArray, p: NDArray, dt: float) -> FloatArray:
