@@ -22,7 +22,7 @@ VERBS = {
     "effects": "List the ways in which an aircraft may differ from its model.",
     "compare": "Fly controllers with and without protection on the same cases.",
     "reproduce": "Put the founding paper's numbers beside ours.",
-    "benchmark": "Measure how fast the testbed is.",
+    "benchmark": "Measure the testbed: speed, diagnosis, ice told, protection, control, real flight.",
     "identify": "Estimate aerodynamic derivatives from flight records.",
     "characterise": "Tell the ice on each surface, its onset, and whether protection works.",
     "train": "Learn a controller.",

@@ -74,6 +74,15 @@ def test_failures_are_told_by_tier_and_the_farthest_first(tmp_path):
     assert found[-1]["truth"] == "stuck az, no gap"
 
 
+def test_a_published_set_is_never_written_over(tmp_path):
+    there = tmp_path / "a.tar.xz"
+    there.write_text("kept")
+    with pytest.raises(InputError, match=r"a\.tar\.xz: is there already"):
+        CliRunner().invoke(command, ["diagnosis", "--publish", str(there), "--out", str(tmp_path / "out")],
+                           catch_exceptions=False)  # fmt: skip
+    assert there.read_text() == "kept" and not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize("asked", [("--pool", "x"), ("--jsbsim",)])
 @pytest.mark.parametrize("option", ["--publish", "--ledger"])
 def test_a_set_that_is_not_drawn_is_not_entered_or_published(asked, option, tmp_path):

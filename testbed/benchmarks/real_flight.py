@@ -128,6 +128,8 @@ def measure(names: Sequence[str] = (), progress: Progress = lambda text: None) -
     here = folder().is_dir()
     if not here and set(names) - {"residual_ice"}:
         raise InputError(f"no recorded flights in {folder()}: set ICING_FLIGHT_DATA to the folder of SIDPAC's records")
+    if not here and not names:
+        progress(f"no recorded flights in {folder()} (ICING_FLIGHT_DATA): the founding paper's own gap alone")
     return [case(progress) for name, case in CASES.items()
             if (name in names or not names) and (here or name == "residual_ice")]
 

@@ -32,7 +32,8 @@ icing benchmark diagnosis --jsbsim"""
 @click.option("--figure", type=click.Path(path_type=Path), help="characterisation: reliability curves as PNG.")
 @click.option("--encounters", type=click.IntRange(min=2), help="protection: encounters per row; 1000 if omitted.")
 @click.option("--only", metavar="A,B,...",
-              help="of these only. protection: rows; real_flight, policies: cases; recordings: recorders.")
+              help="of these only, named as the tables name them. protection: rows; real_flight, policies: cases; "
+                   "recordings: recorders.")
 @click.option("--cases", type=click.IntRange(min=8),
               help="how many. diagnosis: 2400 if omitted, 150 with --quick; recordings: 24, 8.")
 @click.option("--fresh-seed", is_flag=True, help="diagnosis: a sealed set, its seed from the operating system.")
@@ -63,9 +64,11 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
     autopilot stalls or departs, unprotected, with every protection and with the true ice known; nuisance in clear air;
     the time that a protection takes. `adaptation`: flying qualities of iced aircraft with the control laws adapted,
     against the clean aircraft's. `diagnosis`: gaps drawn and flown by a plant of the benchmark's own, half of them in
-    another form than the library's, some in no library; the solver does not see the keys. `recordings`: some of these
-    flights as other recorders would have them, slower, on fewer levels, with holes, in part. Seeds are fixed in the
-    code, apart from those of the training; --seed changes nothing but the sets of these two.
+    another form than the library's, some in no library; the solver does not see the keys. 2400 cases take some six
+    hours on two cores. `recordings`: some of these flights as other recorders would have them, slower, on fewer
+    levels, with holes, in part. `real_flight`: NASA's recorded flights (ICING_FLIGHT_DATA) and the founding paper's own
+    gap. `policies`: which ranking of controllers a gap turns round, before the diagnosis and after. Seeds are fixed in
+    the code, apart from those of the training; --seed changes nothing but the sets of `diagnosis` and `recordings`.
     """
     if name == "speed":
         _speed(as_json)
@@ -79,6 +82,8 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
     if (pool or jsbsim or jsbsim_root) and (publish or ledger):
         option, beside = "--publish" if publish else "--ledger", "--pool" if pool else "--jsbsim"
         raise InputError(f"{option}: of a set that is drawn and solved; leave it out with {beside}")
+    if publish is not None and publish.exists():
+        raise InputError(f"{publish}: is there already, and a published set stays as it is; give another --publish")
     if name == "diagnosis" and (jsbsim or jsbsim_root):
         _jsbsim(cases, seed, out / "jsbsim", workers, jsbsim_root, as_json)
         return
