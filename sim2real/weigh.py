@@ -89,7 +89,8 @@ def first_guess(flights: Sequence[Reconstruction], candidates: Bank, baseline: B
     fits = sorted((fit_family(reduced, f) for f in few.families), key=lambda fit: -fit.log_evidence)[:GUESSES]
     if not fits or fits[0].log_evidence < PLAIN:
         return known
-    flying = Flying(flights, few, evidences, baseline, tempering, Courses([Course(e) for e in evidences], tempering))
+    courses = Courses([Course(e) for e in evidences], tempering, few.terms)
+    flying = Flying(flights, few, evidences, baseline, tempering, courses)
     alone = [of_one(fit) for fit in fits if fit.log_evidence > PLAIN]
     starts = [np.clip(centre + nuisance_mean(gram, few, fit.weights or {}), -FARTHEST, FARTHEST) for fit in alone]
     points = flying.descended(alone, starts)
@@ -166,7 +167,8 @@ class _Weighing:
 
     def _flying(self) -> Flying:
         t = self.posterior.tempering
-        return Flying(self.flights, self.candidates, self.evidences, self.baseline, t, Courses(self.along, t))
+        courses = Courses(self.along, t, self.candidates.terms)
+        return Flying(self.flights, self.candidates, self.evidences, self.baseline, t, courses)
 
     def judged(self) -> bool:
         """Find the gains of the likeliest explanation, and where the model is flown beside something unknown.

@@ -187,7 +187,8 @@ def bent() -> tuple[Flying, Bent]:
     candidates = replace(bank(), families=())
     evidence = gather(flight, candidates)
     baseline = Baseline(load(), np.eye(len(candidates.nuisances)))
-    flying = Flying([flight], candidates, [evidence], baseline, 1.0, Courses([Course(evidence)], 1.0))
+    flying = Flying([flight], candidates, [evidence], baseline, 1.0,
+                    Courses([Course(evidence)], 1.0, candidates.terms))
     nothing = SetFit(misfit=float(evidence.gram[0, 0]))
     point = flying.settle(nothing, np.zeros(len(candidates.nuisances)))
     return flying, Bent(point, flying.left_over(nothing, point))

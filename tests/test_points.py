@@ -38,7 +38,8 @@ def flying() -> Flying:
     candidates = replace(bank(), families=())
     evidence = gather(flight, candidates)
     baseline = Baseline(load(), np.eye(len(candidates.nuisances)))
-    return Flying([flight], candidates, [evidence], baseline, 1.0, Courses([Course(evidence)], 1.0))
+    return Flying([flight], candidates, [evidence], baseline, 1.0,
+                    Courses([Course(evidence)], 1.0, candidates.terms))
 
 
 def test_what_was_kept_of_the_terms_is_their_response(flying):
@@ -46,7 +47,7 @@ def test_what_was_kept_of_the_terms_is_their_response(flying):
     assert evidence.linear is not None
     again = evidence.linear.respond(pushes(evidence.linear.flight, terms))
     at = [j for j, term in enumerate(terms) if term.row in again.rows]
-    (kept, inner), = flying.courses.of_terms(terms)
+    (kept, inner), = flying.courses.of_terms()
     assert len(at) > 100 and np.max(np.abs(again.values)) > 1.0
     assert kept[:, at] == pytest.approx(again.values, abs=1e-12) and not np.delete(kept, at, axis=1).any()
     assert inner[np.ix_(at, at)] == pytest.approx(again.values.T @ again.values, rel=1e-9, abs=1e-6)

@@ -52,7 +52,8 @@ def flying() -> Flying:
     flight, candidates = flown({"directional_stability": {"change": -0.35}}), replace(WHOLE, families=())
     evidence = gather(flight, candidates)
     baseline = Baseline(load(), np.eye(len(candidates.nuisances)))
-    return Flying([flight], candidates, [evidence], baseline, 1.0, Courses([Course(evidence)], 1.0))
+    return Flying([flight], candidates, [evidence], baseline, 1.0,
+                    Courses([Course(evidence)], 1.0, candidates.terms))
 
 
 def test_sets_flown_side_by_side_cost_what_each_does_alone(flying):

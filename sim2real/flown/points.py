@@ -127,8 +127,7 @@ class Flying:
         return self._slopes([e.rows[:, : len(self.candidates.nuisances)] / NUISANCE_STEP for e in self.evidences])
 
     def _slopes(self, rows: Sequence[FloatArray]) -> list[Slopes]:
-        made = self.courses.of_terms(self.candidates.terms)
-        return [Slopes(own, terms) for own, (terms, _) in zip(rows, made, strict=True)]
+        return [Slopes(own, terms) for own, (terms, _) in zip(rows, self.courses.of_terms(), strict=True)]
 
     def _descended(self, fit: SetFit, best: Point) -> Point:
         """The best that is reached with the slopes by nuisances as they are: two to four rows a flight."""
@@ -251,12 +250,12 @@ class Flying:
         first = 1 + k + n
         moved = tuple(replace(term, row=first + j) for j, term in enumerate(terms))
         gram, kept, left_in = np.zeros((first + len(terms),) * 2), [], dict.fromkeys(PATHS, 0.0)
-        pushed = self.courses.pushed(terms, point.weights, 1 + k)
+        pushed = self.courses.pushed(point.weights, 1 + k)
         moved_to = [rows_of(flight, self.candidates, fit, point.sizes, point.steps, point.nuisances)[: 1 + k]
                     for flight in self.flights]
         made = self._flown(moved_to, pushed, range(1 + k)) if point.weights else point.rows
         for flight, rows, own, slopes, (generic, inner) in zip(
-                self.flights, moved_to, made, point.slopes, self.courses.of_terms(terms), strict=True):
+                self.flights, moved_to, made, point.slopes, self.courses.of_terms(), strict=True):
             for component, over in excess(flight, rows[:1]).items():
                 left_in[component] += over / self.tempering
             across = np.concatenate([own.T @ generic, slopes.onto])

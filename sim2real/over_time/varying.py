@@ -22,7 +22,7 @@ from icing_env.record import FloatArray
 from sim2real.baseline.references import Baseline
 from sim2real.flown.companions import CERTAIN
 from sim2real.flown.steps import FARTHEST
-from sim2real.library.candidates import Bank, Family, shifted, unbroken
+from sim2real.library.candidates import Bank, Family, piece_at, shifted, unbroken
 from sim2real.over_time.by_stretch import (
     Way,
     cut_up,
@@ -153,8 +153,7 @@ def _or_any(unknown: Hypothesis, worth: Sequence[float]) -> Hypothesis:
 def _set_fit(candidates: Bank, family: Family, fit: _Fit, log: float) -> SetFit:
     """An effect at its mean size."""
     p, mean = family.parameter, float(np.mean(fit.sizes))
-    own = next(f for f in candidates.families if f.effect is family.effect and f.parameter is p
-               and f.low - 1e-9 <= mean <= f.high + 1e-9)  # fmt: skip
+    own = piece_at(family, mean, candidates.families)
     low, high = (float(np.clip(mean + side * 1.96 * fit.error, p.low, p.high)) for side in (-1.0, 1.0))
     return SetFit((own,), log, (mean,), (low,), (high,), np.array([[fit.error**2]]), None, fit.left)
 

@@ -19,11 +19,9 @@ from icing_env.record import FloatArray
 from icing_env.simulate import Fleet
 from sim2real.prediction.along import along
 from sim2real.prediction.kalman import Gain
-from sim2real.prediction.predictor import Push, held, listed, lost, put, spare, steered, stretch, typical_state
+from sim2real.prediction.predictor import Push, held, listed, lost, put, spare, started, steered, stretch, substeps
 from sim2real.records.channels import MEASURED
 from sim2real.records.reconstruct import Reconstruction
-
-START = 0.25  # s whose mean a row starts from
 
 
 def end_to_end(rows: Sequence[NDArray]) -> NDArray:
@@ -69,7 +67,7 @@ class _EndToEnd:
         to_the_end = [np.minimum(np.arange(len(f.time)), len(g.K) - 1) for f, g in zip(flights, gains, strict=True)]
         K = np.concatenate([g.K[steps] for g, steps in zip(gains, to_the_end, strict=True)])
         self.gain = np.ascontiguousarray(np.swapaxes(K, 1, 2))[None]
-        self.starts = [typical_state(f, slice(0, max(2, round(START / f.dt)))) for f in flights]
+        self.starts = [started(f, 0) for f in flights]
 
     def innovations(self, rows: Sequence[NDArray], pushes: Sequence[tuple[Push, ...]]) -> list[FloatArray]:
         counts = [len(own) for own in rows]
@@ -77,7 +75,7 @@ class _EndToEnd:
         of = np.repeat(np.arange(len(rows)), counts)
         of = np.concatenate([of, np.repeat(of[-1:], spare(len(of)))])
         everything = end_to_end([*rows, *[rows[-1][-1:]] * (len(of) - int(at[-1]))])
-        fleet = Fleet(held(everything, dt), len(of), dt, max(1, round(dt / 0.02)))
+        fleet = Fleet(held(everything, dt), len(of), dt, substeps(dt))
         put(fleet, {name: np.array([start[name] for start in self.starts])[of] for name in self.starts[0]})
         pushed = [replace(q, row=int(at[i]) + q.row, series=self._placed(i, q.series))
                   for i, some in enumerate(pushes) for q in some]  # fmt: skip

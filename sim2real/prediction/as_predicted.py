@@ -31,9 +31,7 @@ def as_predicted(flight: Reconstruction, left: FloatArray, gain: Gain) -> Recons
     filled = replace(flight, measured=measured)
     again = innovations(filled, flight.parameters, gain.K * (stretch(flight) / stretch(filled)))[:, 0]
     throughout = replace(filled, measured=predicted(filled, again))
-    for name in (MEASURED[c] for c in np.flatnonzero(blank.any(axis=0))):
-        told.kept["channel", name] = throughout.channel(name)
-    return told
+    return told.filled_as(throughout, [MEASURED[c] for c in np.flatnonzero(blank.any(axis=0))])
 
 
 def predicted(flight: Reconstruction, left: FloatArray) -> FloatArray:

@@ -104,7 +104,7 @@ def gains(flight: Reconstruction, sigmas: tuple[float, ...]) -> list[Gain]:
     # far apart, samples differ by gusts most of all: what is left of that says little, and too much harms less
     least = np.where(np.array(every) > 1, SURE * seen, 0.0)
     for sigma in sigmas:
-        Qw, columns = _gusts(flight, sigma)
+        Qw, columns = gusts(flight, sigma)
         noise = np.maximum(seen - roughness(A, C, A[:, columns], C[:, columns], Qw, every), least)
         model = _noisy(flight, A, C, B, sigma, Qw, noise, read_share(flight))
         steady, S = _steady(*model)
@@ -121,7 +121,7 @@ def follow(flight: Reconstruction, gain: Gain) -> Gain:
     """
     steps, each = len(flight.time) - 1, max(round(SPAN / flight.dt), 1)
     spans = [slice(k, min(k + each, steps + 1)) for k in range(0, steps, each)]
-    P, (Qw, columns) = _start_covariance(gain.sigma), _gusts(flight, gain.sigma)
+    P, (Qw, columns) = _start_covariance(gain.sigma), gusts(flight, gain.sigma)
     lost = unread(flight)[1:].astype(float)
     D = gain.model[1][:, columns]
     share, steadily = read_share(flight), np.arange(FED_BACK) == ALTITUDE
@@ -139,7 +139,7 @@ def follow(flight: Reconstruction, gain: Gain) -> Gain:
     return replace(gain, K=np.swapaxes(by_channel, 1, 2), S=np.concatenate(S))
 
 
-def _gusts(flight: Reconstruction, sigma: float) -> tuple[FloatArray, list[int]]:
+def gusts(flight: Reconstruction, sigma: float) -> tuple[FloatArray, list[int]]:
     """Covariance of what drives the gusts over a step, and which states it drives."""
     speed, height = float(np.median(flight.channel("airspeed"))), float(np.median(flight.altitude))
     return gust_noise(sigma, speed, height, flight.dt), DRYDEN

@@ -24,10 +24,12 @@ from icing_env.simulate import Fleet
 from icing_env.types import STATE
 from sim2real.prediction.along import CONTROLS, SLOW_SURFACE, STATES, STILL, X, along, columns, read, turn
 from sim2real.records.channels import FED_BACK, MEASURED, SURFACES
+from sim2real.records.instruments import STEP
 from sim2real.records.reconstruct import Reconstruction
 
 # rows at a time that the compiler turns into vector instructions: as many as a register of the processor holds
 QUICK = 8 if llvmlite.binding.get_host_cpu_features().get("avx512f") else 4
+START = 0.25  # s whose mean a row starts from
 LOST = 1e9  # what a row that flew to no numbers is off by, in any unit
 ANGLES = ("phi", "theta")  # corrected through the quaternion
 NOISES = [name for name in PARAMETERS.names or () if name.startswith("noise_")]
@@ -57,12 +59,12 @@ class Predictor:
 
     def __init__(self, flight: Reconstruction, parameters: NDArray, n: int | None = None) -> None:
         self.flight, self.n = flight, len(parameters) if n is None else n
-        self.fleet = Fleet(held(parameters, flight.dt), self.n, flight.dt, max(1, round(flight.dt / 0.02)))
+        self.fleet = Fleet(held(parameters, flight.dt), self.n, flight.dt, substeps(flight.dt))
         self.x = self.fleet.state.view(np.float64).reshape(self.n, -1)
 
     def place(self, k: int) -> None:
-        """Start every row at the measured state of sample `k` (a quarter of a second averaged)."""
-        put(self.fleet, typical_state(self.flight, slice(k, k + max(2, round(0.25 / self.flight.dt)))))
+        """Start every row at the measured state of sample `k`."""
+        put(self.fleet, started(self.flight, k))
 
     def place_in(self, spans: Sequence[slice], each: int) -> None:
         """Put `each` rows after another at the typical state of each span of the record."""
@@ -126,6 +128,16 @@ def seen(flight: Reconstruction) -> FloatArray:
 def stretch(flight: Reconstruction) -> FloatArray:
     """By which a fed-back channel's error is multiplied where it was sampled: the sparser, the more [FED_BACK]."""
     return np.asarray(np.max(seen(flight), axis=0, initial=1.0)[:FED_BACK])
+
+
+def substeps(dt: float) -> int:
+    """Steps of the integration in one of a record."""
+    return max(1, round(dt / STEP))
+
+
+def started(flight: Reconstruction, k: int) -> dict[str, float]:
+    """The measured state that flights begin from at a sample, START s averaged."""
+    return typical_state(flight, slice(k, k + max(2, round(START / flight.dt))))
 
 
 def steered(flight: Reconstruction) -> FloatArray:

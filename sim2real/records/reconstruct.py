@@ -7,7 +7,7 @@ kept in `notes`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
@@ -109,6 +109,13 @@ class Reconstruction:
         """One column of `measured`, gaps filled by interpolation; zeros where it was not recorded."""
         return self.once(("channel", name), lambda: self._filled(self.measured[:, MEASURED.index(name)]))
 
+    def filled_as(self, other: Reconstruction, names: Iterable[str]) -> Reconstruction:
+        """The same with gaps of some channels filled as another has these channels."""
+        filled = replace(self)
+        for name in names:
+            filled.kept["channel", name] = other.channel(name)
+        return filled
+
     def _filled(self, values: FloatArray) -> FloatArray:
         good = np.isfinite(values)
         if not good.any():
@@ -181,7 +188,7 @@ def _steps(record: FlightRecord, notes: list[str]) -> tuple[FloatArray, float, d
         raise InputError(f"{where} lacks {', '.join(lacking)}: a diagnosis needs time, {', '.join(LONGITUDINAL)}")
     if grid.dt > LONGEST_STEP * 1.01:
         raise InputError(f"{where} has {1/grid.dt:.3g} samples/s; at least 10 are needed")
-    every = max(1, round(0.02 / grid.dt)) if grid.dt < SHORTEST_STEP else 1
+    every = max(1, round(instruments.STEP / grid.dt)) if grid.dt < SHORTEST_STEP else 1
     if (lasts := float(np.ptp(grid.time))) < SHORTEST:
         raise InputError(f"{where} lasts {lasts:.3g} s; at least {SHORTEST:g} are needed")
     if every > 1:

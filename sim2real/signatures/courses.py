@@ -154,24 +154,24 @@ class Course:
 class Courses:
     """Generic terms and free courses along some records."""
 
-    def __init__(self, along: Sequence[Course], tempering: float) -> None:
-        self.along, self.tempering = along, tempering
+    def __init__(self, along: Sequence[Course], tempering: float, terms: Sequence[Term] = ()) -> None:
+        self.along, self.tempering, self.terms = along, tempering, terms
         self._terms: list[tuple[FloatArray, FloatArray]] = []
         self._pushed: list[tuple[Push, ...]] = []
 
-    def pushed(self, terms: Sequence[Term], weights: Mapping[int, float], rows: int) -> list[tuple[Push, ...]]:
+    def pushed(self, weights: Mapping[int, float], rows: int) -> list[tuple[Push, ...]]:
         """What generic terms of given weights together push in every record, for each of some rows."""
         if not weights:
             return [()] * len(self.along)
         if not self._pushed:
-            self._pushed = [course.pushes(terms) for course in self.along]
+            self._pushed = [course.pushes(self.terms) for course in self.along]
         return [_together(pushed, weights, rows) for pushed in self._pushed]
 
-    def of_terms(self, terms: Sequence[Term]) -> list[tuple[FloatArray, FloatArray]]:
-        """What generic terms make of every record [N x channels, terms], and its inner products; always the same."""
+    def of_terms(self) -> list[tuple[FloatArray, FloatArray]]:
+        """What generic terms make of every record [N x channels, terms], and its inner products."""
         if not self._terms:
             made = [course.evidence.rows for course in self.along]
-            own = [rows[:, rows.shape[1] - len(terms) :] for rows in made]
+            own = [rows[:, rows.shape[1] - len(self.terms) :] for rows in made]
             self._terms = [(rows, rows.T @ rows) for rows in own]
         return self._terms
 
