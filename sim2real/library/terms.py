@@ -92,6 +92,7 @@ DEVIATION = {"alpha": 0.05, "beta": 0.05, "q": 0.1, "p": 0.2, "r": 0.1, "elevato
 FLOW_RATES, WASHED = ("alpha_dot", "beta_dot"), 0.1  # rates of the flow's angles, and s over which they are taken
 DAMPING = 0.15  # of a mode (assumed: a real one's is less, but its frequency is not the term's)
 FROM_ZERO = ("alpha", "beta", "p", "q", "r")  # channels whose scale counts from zero
+EASED = 0.02  # rad, or rad/s, over which a surface changes side, or direction (assumed)
 SECOND_ORDER = 0.1  # s, by which an actuator of second order smooths what it lacks in acceleration (assumed)
 ERECTION = 30.0  # s in which a vertical gyro follows a false vertical (assumed)
 KNOT_AT = "at:"  # how the hat about a knot is named
@@ -161,8 +162,8 @@ def path_courses(flight: Reconstruction, position: FloatArray, names: Sequence[s
     acceleration, share = np.gradient(rate, flight.dt), min(flight.dt / SECOND_ORDER, 1.0)
     course = {"1": np.ones(len(position)), "position": position, "acceleration": acceleration,
               "inertia": lfilter([share], [1.0, share - 1.0], acceleration),
-              "position*position*position": position**3 / reach**2, "direction": np.tanh(rate / 0.02),
-              "side": np.tanh(position / 0.02), "magnitude": np.abs(position)}  # fmt: skip
+              "position*position*position": position**3 / reach**2, "direction": np.tanh(rate / EASED),
+              "side": np.tanh(position / EASED), "magnitude": np.abs(position)}  # fmt: skip
     return [PATH_SIZE[name] * course[name] if name in course else PATH_SIZE["1"] * _course(flight, name)
             for name in names]
 

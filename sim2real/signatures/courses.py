@@ -37,7 +37,7 @@ class Remainder:
         rows: those before it, of every record, in parts side by side [N x channels, first], but for the paths.
         excess: whitened square above noise that is left in paths, by component.
         late, wander: delays that would take most of what paths leave, and free courses there, by component.
-        held: nuisances (by row) that are as far as they may be, and give way no more.
+        held: nuisances and sizes (by row) that are as far as they may be, and give way no more.
     """
 
     gram: FloatArray
@@ -53,7 +53,7 @@ class Remainder:
         return projected(self.gram, self.first, self.held)
 
     def unbounded(self) -> float:
-        """Whitened square that would be left if no nuisance were held: what the model's own numbers could not do."""
+        """Whitened square that would be left if nothing were held: what the model's own numbers could not do."""
         return float(projected(self.gram[: self.first, : self.first], self.first)[0, 0])
 
 

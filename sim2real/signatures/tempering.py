@@ -33,9 +33,10 @@ def temper(misfit: float, evidences: Sequence[Evidence]) -> float:
     """What to divide the evidence by because even the best explanation leaves more than noise, and that coloured.
 
     With the mean whitened square c of what is left over and the time tau that it stays correlated (in samples):
-    1 + (c - 1) tau, and 1 where c is below one, what may be luck left out. Model error that nobody can name is thus
-    counted as noise, instead of as thousands of independent proofs of whatever lies nearest. tau is that of the model's
-    own innovations; an explanation that takes most of what they have above noise takes as much of their colour.
+    1 + (c - 1) tau, and 1 where c is below one, what may be luck left out (FIRST_ORDER in the place of 1 with a user's
+    simulator). Model error that nobody can name is thus counted as noise, instead of as thousands of independent proofs
+    of whatever lies nearest. tau is that of the model's own innovations; an explanation that takes most of what they
+    have above noise takes as much of their colour.
 
     Args:
         misfit: whitened square that the best explanation leaves, nuisances at their best.
