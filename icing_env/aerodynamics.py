@@ -56,7 +56,8 @@ AERODYNAMIC_PARAMETERS: list[Field] = [
     ("ground_moment", "1", "moment at the ground (loss of downwash)"),
     # what no derivative expresses: a description of something unknown (`discrepancy` below)
     ("CX_elevator", "1/rad", "axial force per elevator"),
-    *((f"{c}_airspeed", "s/m", f"{c} per true airspeed") for c in ("CX", "CZ", "Cm")),
+    *((f"{c}_airspeed", "s/m", f"{c} per true airspeed") for c in ("CX", "CZ", "Cm", "CY", "Cl", "Cn")),
+    *((f"{c}_airspeed2", "s2/m2", f"{c} per square of true airspeed") for c in ("Cl", "Cm", "Cn")),
     *((f"{c}_alpha2", "1/rad2", f"{c} per square of the angle of attack") for c in ("CZ", "Cm")),
     ("Cm_alpha_elevator", "1/rad2", "Cm per angle of attack times elevator"),
     *((f"{c}_alpha_beta", "1/rad2", f"{c} per angle of attack times sideslip") for c in ("CY", "Cl", "Cn")),
@@ -135,11 +136,12 @@ def discrepancy(alpha: float, beta: float, airspeed: float, x: Any, c: Any, p: A
     Terms of a regression on residual coefficients (Klein & Morelli, Aircraft System Identification, section 5.4) that
     are no derivatives of the model; `c.elapsed`: s since the start.
     """
-    t, sideways = c.elapsed, alpha*beta
-    cx = p.CX_elevator*x.elevator + p.CX_airspeed*airspeed + p.CX_time*t
-    cy = p.CY_alpha_beta*sideways + p.CY_time*t
-    cz = p.CZ_alpha2*alpha*alpha + p.CZ_airspeed*airspeed + p.CZ_time*t
-    cl = p.Cl_alpha_beta*sideways + p.Cl_time*t
-    cm = alpha*(p.Cm_alpha2*alpha + p.Cm_alpha_elevator*x.elevator) + p.Cm_airspeed*airspeed + p.Cm_time*t
-    cn = p.Cn_alpha_beta*sideways + p.Cn_time*t
+    t, sideways, V = c.elapsed, alpha*beta, airspeed
+    cx = p.CX_elevator*x.elevator + p.CX_airspeed*V + p.CX_time*t
+    cy = p.CY_alpha_beta*sideways + p.CY_airspeed*V + p.CY_time*t
+    cz = p.CZ_alpha2*alpha*alpha + p.CZ_airspeed*V + p.CZ_time*t
+    cl = p.Cl_alpha_beta*sideways + V*(p.Cl_airspeed + p.Cl_airspeed2*V) + p.Cl_time*t
+    cm = (alpha*(p.Cm_alpha2*alpha + p.Cm_alpha_elevator*x.elevator) + V*(p.Cm_airspeed + p.Cm_airspeed2*V)
+          + p.Cm_time*t)
+    cn = p.Cn_alpha_beta*sideways + V*(p.Cn_airspeed + p.Cn_airspeed2*V) + p.Cn_time*t
     return cx, cy, cz, cl, cm, cn

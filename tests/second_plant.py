@@ -188,7 +188,7 @@ def longitudinal(x: Record, a: Record, f: Record, h: Record, ct: Any, c: Record,
           + p.Cm_flap * x.flap + p.Cm_CT * ct + low * p.ground_moment
           - f.tail * p.Cm_alpha_tail * (f.alpha_tail + c.alpha_tail_stall))  # fmt: skip
     Cm += p.Cm_alpha2 * a.alpha**2 + p.Cm_alpha_elevator * a.alpha * x.elevator
-    return CX, CZ, Cm + p.Cm_airspeed * a.V + p.Cm_time * c.elapsed
+    return CX, CZ, Cm + p.Cm_airspeed * a.V + p.Cm_airspeed2 * a.V**2 + p.Cm_time * c.elapsed
 
 
 def lateral(x: Record, a: Record, f: Record, h: Record, c: Record, p: Record) -> tuple[Any, Any, Any]:
@@ -200,8 +200,10 @@ def lateral(x: Record, a: Record, f: Record, h: Record, c: Record, p: Record) ->
     Cn = (p.Cn_0 + c.Cn_beta * a.beta + c.Cn_p * a.phat + c.Cn_r * a.rhat + c.Cn_aileron * x.aileron
           + c.Cn_rudder * x.rudder - p.lift_arm * (h.X_right - h.X_left) / 2)  # fmt: skip
     ab, t = a.alpha * a.beta, c.elapsed
-    return (CY + p.CY_alpha_beta * ab + p.CY_time * t, Cl + p.Cl_alpha_beta * ab + p.Cl_time * t,
-            Cn + p.Cn_alpha_beta * ab + p.Cn_time * t)  # fmt: skip
+    CY += p.CY_alpha_beta * ab + p.CY_airspeed * a.V + p.CY_time * t
+    Cl += p.Cl_alpha_beta * ab + p.Cl_airspeed * a.V + p.Cl_airspeed2 * a.V**2 + p.Cl_time * t
+    Cn += p.Cn_alpha_beta * ab + p.Cn_airspeed * a.V + p.Cn_airspeed2 * a.V**2 + p.Cn_time * t
+    return CY, Cl, Cn
 
 
 # ---- sections 10 to 13

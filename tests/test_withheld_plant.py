@@ -13,7 +13,7 @@ from icing_env import aircraft
 from icing_env import effects as library
 from icing_env.simulate import Fleet
 from sim2real.records.channels import TOLERANCE
-from testbed.withheld import effects, manoeuvres
+from testbed.withheld import effects, manoeuvres, refly
 from testbed.withheld import plant as pl
 from testbed.withheld.flights import Aircraft, Flown, fly
 from testbed.withheld.instruments import FAST
@@ -77,6 +77,26 @@ def test_effects_of_the_same_form_are_the_librarys():
             if error > allowed:
                 wrong[part[0], c] = error / allowed
     assert not wrong
+
+
+def test_what_describes_something_unknown_acts_as_in_the_simulator():
+    """Every number that an answer may add, at a size that moves the aircraft by some tolerances."""
+    moves = {"CX": 0.01, "CY": 2e-3, "CZ": 0.02, "Cl": 5e-4, "Cm": 0.01, "Cn": 5e-4}
+    of = {"airspeed": 4.0, "airspeed2": 4.0 * 72.0, "time": 12.0, "elevator": 0.05, "alpha2": 0.002, "alpha_beta": 4e-4,
+          "alpha_elevator": 0.002}  # fmt: skip
+    sizes = {name: moves[name[:2]] / of[name[3:]] for name in refly.DESCRIBED}
+    p = np.repeat(aircraft.load(), len(sizes))
+    for i, (name, size) in enumerate(sizes.items()):
+        p[name][i] = size
+    flown, still = [fly(Aircraft(terms={name: size}), CRUISE) for name, size in sizes.items()], fly(Aircraft(), CRUISE)
+    samples = 1000  # ailerons and rudder from 11 s on
+    ours = flown_again(flown, p, samples)
+    for i, name in enumerate(sizes):
+        moved = {c: np.max(np.abs(flown[i].channels[c][:samples] - still.channels[c][:samples])) for c in FAST}
+        assert max(moved[c] / TOLERANCE[c] for c in FAST if c in TOLERANCE) > 0.1, name
+        for c in FAST:
+            allowed = (CLOSE * TOLERANCE[c] if c in TOLERANCE else 2e-3) + 0.05 * moved[c]
+            assert np.max(np.abs(ours[c][i] - flown[i].channels[c][:samples])) < allowed, (name, c)
 
 
 def test_every_effect_of_the_library_but_turbulence_is_drawn():

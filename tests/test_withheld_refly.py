@@ -78,15 +78,17 @@ def test_terms_about_a_condition_are_those_of_the_library():
     from icing_env.effects import with_effects
 
     values = {"CX_alpha_alpha": 0.4, "CZ_alpha": 0.3, "CZ_0": 0.01, "Cm_elevator": -0.1, "CY_r": 0.2, "Cl_0": 1e-3,
-              "at_alpha": 0.05, "at_elevator": -0.02, "bias_alpha": 0.01, "scale_alpha": 0.1}  # fmt: skip
-    terms, lacking = refly.linear(values)
+              "Cm_alpha_elevator": 0.5, "Cn_alpha_beta": 0.2, "Cl_airspeed": 1e-4, "Cl_airspeed_airspeed": 1e-6,
+              "CZ_time": 1e-3, "at_alpha": 0.05, "at_elevator": -0.02, "at_airspeed": 65.0, "at_time": 20.0,
+              "bias_alpha": 0.01, "scale_alpha": 0.1, "scale_airspeed": 0.02}  # fmt: skip
+    terms, lacking = refly.numbers(values)
     before, after = load(), with_effects(load(), {"discrepancy": values})
     changed = {n for n in before.dtype.names if before[n][0] != after[n][0]}
     assert not lacking and changed == set(terms)
     for name, value in terms.items():
         assert after[name][0] - before[name][0] == pytest.approx(value)
-    assert refly.linear({"Cm_alpha_elevator": 1.0, "CZ_time": 0.1, "drift_q": 0.1, "Cn_p": 0.0})[1] == [
-        "discrepancy.Cm_alpha_elevator", "discrepancy.CZ_time", "discrepancy.drift_q"]
+    assert refly.numbers({"delay_alpha": 0.1, "drift_q": 0.1, "Cn_p": 0.0})[1] == [
+        "discrepancy.delay_alpha", "discrepancy.drift_q"]
 
 
 def test_noise_alone_is_no_gap_and_the_start_is_fitted():

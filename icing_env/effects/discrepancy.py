@@ -16,18 +16,19 @@ from icing_env.effects.effect import Effect, Parameter, Values
 from icing_env.sensors import BIASED, DELAYED, DRIFTING, SCALED
 from icing_env.types import unit_of
 
-SIDEWAYS = ("0", "beta", "p", "r", "aileron", "rudder", "alpha_beta", "time")
+SIDEWAYS = ("0", "beta", "p", "r", "aileron", "rudder", "alpha_beta", "airspeed", "airspeed_airspeed", "time")
 TERMS: dict[str, tuple[str, ...]] = {
     "CX": ("0", "alpha", "alpha_alpha", "elevator", "airspeed", "time"),
-    "CY": tuple(term for term in SIDEWAYS if term != "aileron"),
+    "CY": tuple(term for term in SIDEWAYS if term not in ("aileron", "airspeed_airspeed")),
     "CZ": ("0", "alpha", "q", "elevator", "alpha_alpha", "airspeed", "time"),
     "Cl": SIDEWAYS,
-    "Cm": ("0", "alpha", "q", "elevator", "alpha_alpha", "alpha_elevator", "airspeed", "time"),
+    "Cm": ("0", "alpha", "q", "elevator", "alpha_alpha", "alpha_elevator", "airspeed", "airspeed_airspeed", "time"),
     "Cn": SIDEWAYS,
 }
 AT = {"alpha": "rad", "elevator": "rad", "airspeed": "m/s", "time": "s", "phi": "rad", "theta": "rad", "ax": "m/s2",
       "ay": "m/s2", "az": "m/s2", "altitude": "m"}  # fmt: skip
 CHANNELS = DRIFTING  # those of which an error can be described: airspeed to altitude
+SQUARES = {"alpha_alpha": "alpha2", "airspeed_airspeed": "airspeed2"}  # as the parameters are named
 LARGEST = 1e3  # either way, of everything (no range is searched)
 
 
@@ -56,13 +57,13 @@ def _add(p: NDArray, coefficient: str, factors: tuple[str, ...], values: Values)
             if not keep:
                 change = -change*values[f"at_{factor}"]
         name = "_".join(left) or "0"
-        p[f"{coefficient}_{'alpha2' if name == 'alpha_alpha' else name}"] += change
+        p[f"{coefficient}_{SQUARES.get(name, name)}"] += change
 
 
 def unit(coefficient: str, term: str) -> str:
     """Unit of one term's size: per rad of every angle and normalised rate, per m/s, per s."""
-    if term in ("airspeed", "time"):
-        return "s/m" if term == "airspeed" else "1/s"
+    if term in (units := {"airspeed": "s/m", "airspeed_airspeed": "s2/m2", "time": "1/s"}):
+        return units[term]
     return "1/rad2" if "_" in term else unit_of(f"{coefficient}_{term}")
 
 

@@ -78,8 +78,8 @@ def vanes(Y: NDArray, seen: NDArray, s: Mapping[str, float]) -> tuple[NDArray, N
     if s.get("vane_second"):
         hertz = 0.7 * 2.0 / (2.0 * math.pi * s["vane_second"])  # delay 2 zeta/w
         alpha, beta = oscillator(alpha, hertz, 0.7), oscillator(beta, hertz, 0.7)
-    alpha = sticking(alpha + _upwash(Y, seen, s), s.get("stuck_alpha", 0.0))
-    beta = (1.0 + s.get("scale_beta", 0.0)) * beta
+    alpha = sticking(alpha + _upwash(Y, seen, s.get("power_alpha", 0.0)), s.get("stuck_alpha", 0.0))
+    beta = (1.0 + s.get("scale_beta", 0.0)) * beta + _upwash(Y, seen, s.get("power_beta", 0.0))
     shaken = seen[:, pl.FZ] + n["gravity_sea_level"]
     boom = (n["boom_gain"] + s.get("boom_extra", 0.0)) * oscillator(shaken, n["boom_frequency"], n["boom_damping"])
     if s.get("boom_other"):
@@ -96,12 +96,12 @@ def sticking(x: NDArray, grip: float) -> NDArray:
     return out
 
 
-def _upwash(Y: NDArray, seen: NDArray, s: Mapping[str, float]) -> NDArray | float:
-    """Angle at the vane that goes with the thrust coefficient."""
-    if not s.get("power_alpha"):
+def _upwash(Y: NDArray, seen: NDArray, size: float) -> NDArray | float:
+    """Angle at a vane that goes with the thrust coefficient."""
+    if size == 0.0:
         return 0.0
     ct = (seen[:, pl.TL] + seen[:, pl.TR]) / (_dynamic(Y, seen) * PUBLISHED["wing_area"])
-    return np.asarray(s["power_alpha"] * (ct - PUBLISHED["CT_reference"]))
+    return np.asarray(size * (ct - PUBLISHED["CT_reference"]))
 
 
 def _dynamic(Y: NDArray, seen: NDArray) -> NDArray:
@@ -128,14 +128,17 @@ def exact(Y: NDArray, seen: NDArray, s: Mapping[str, float], start: float = 0.0)
     if s.get("flexible_az"):
         raw["az"] = raw["az"] + s["flexible_az"] * (oscillator(raw["az"], 3.2, 0.08) - raw["az"])
     raw["az"] = raw["az"] + s.get("square_az", 0.0) * (raw["az"] + G0) ** 2
+    raw["az"] = raw["az"] + s.get("arm_az", 0.0) * np.gradient(Y[:, pl.Q], pl.DT)
+    raw["r"] = low(raw["r"], gain(s.get("lag_r", 0.0)))
     raw["ax"], raw["az"] = (raw["ax"] + s.get("tilt", 0.0) * raw["az"], raw["az"] - s.get("tilt", 0.0) * raw["ax"])
     raw["p"] = (1.0 + s.get("scale_p", 0.0)) * raw["p"] + s.get("warm_p", 0.0) * (1.0 - np.exp(-t / 12.0))
     raw["q"] = raw["q"] + s.get("gyro_g", 0.0) * (raw["az"] + G0) + s.get("gyro_cross", 0.0) * Y[:, pl.P]
     c |= {name: low(x, recorder) for name, x in raw.items()}
     c |= {"phi": (1.0 + s.get("scale_phi", 0.0)) * Y[:, pl.PHI],
-          "theta": sticking(Y[:, pl.THETA], s.get("stuck_theta", 0.0)) + s.get("attitude_cross", 0.0) * Y[:, pl.PHI],
+          "theta": sticking(Y[:, pl.THETA], s.get("stuck_theta", 0.0)) + s.get("attitude_cross", 0.0) * Y[:, pl.PHI]
+          + s.get("square_phi", 0.0) * Y[:, pl.PHI] ** 2,
           "psi": Y[:, pl.PSI]}  # fmt: skip
-    for name in ("alpha", "beta", "q", "theta", "ax", "az"):
+    for name in ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "ax", "ay", "az"):
         wander = s.get(f"wander_{name}", 0.0)
         c[name] = c[name] + s.get(f"bias_{name}", 0.0) + wander * (1.0 + 0.15 * np.sin(2.0 * math.pi * t / 55.0))
     c |= {"thrust_left": seen[:, pl.TL], "thrust_right": seen[:, pl.TR], "pressure": geopotential_pressure(Y[:, pl.H])}

@@ -71,8 +71,10 @@ def wind(y: Any, p: Any, t: float) -> tuple[float, float, float]:
     north = p.shear * above + p.shear_bounded * 60.0 * math.tanh(above / 60.0) + p.front * math.tanh((t - 20.0) / 3.0)
     down = -p.wind_up - p.wind_wave * math.sin(2.0 * math.pi * t / 50.0)
     down -= p.thermal * math.exp(-((t - 20.0) / 5.0) ** 2)
-    return (north * cth * cps - down * sth, north * (sph * sth * cps - cph * sps) + down * sph * cth,
-            north * (cph * sth * cps + sph * sps) + down * cph * cth)
+    east = p.side_wind_wave * math.sin(2.0 * math.pi * t / 12.0)
+    return (north * cth * cps + east * cth * sps - down * sth,
+            north * (sph * sth * cps - cph * sps) + east * (sph * sth * sps + cph * cps) + down * sph * cth,
+            north * (cph * sth * cps + sph * sps) + east * (cph * sth * sps - sph * cps) + down * cph * cth)
 
 
 @njit(cache=True)
@@ -89,6 +91,7 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     qS = 0.5 * density * V_ * V_ * p.wing_area
     ph, qh, rh = (y[P] * p.span / (2.0 * V_), y[Q] * p.chord / (2.0 * V_), y[R] * p.span / (2.0 * V_))
     fast = V_ / 72.0
+    mass = p.mass * (1.0 - (p.load_dropped if t > 20.0 else 0.0))
 
     # engines
     per = p.propeller_efficiency / math.sqrt(ua * ua + p.propeller_static_speed**2) * (1.0 + p.thrust_at_72 * fast**2)
@@ -118,12 +121,13 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     drag = p.CD_parasite + p.CD_alpha * (a / 0.06) ** 2 + p.CD_lift * zw * zw + p.brake_drag * abs(dr)
     gone = t / 40.0
     drag += p.CD_beta2 * b * b + p.aileron_brake * abs(da) + (p.door if t > 20.0 else 0.0) - 0.2 * p.flap_creep * gone
+    drag += p.elevator_drag * de * de
     adot = (a - y[ALAG]) / 0.05
     cx = 0.5 * (xl + xr) - drag * ca
     cz = (zw - drag * sa + p.CZ_q * qh + p.CZ_elevator * de + p.CZ_CT * ct
           + p.CZ_alphadot * adot * p.chord / (2.0 * V_) + p.CZ_beta2 * b * b + p.CZ_ct_alpha * ct * a
           + p.flap_creep * gone + p.CZ_hysteresis * math.tanh(adot / 0.05) + p.CZ_aileron_abs * abs(da))  # fmt: skip
-    load = -qS * cz / (p.mass * gravity) - 1.0
+    load = -qS * cz / (mass * gravity) - 1.0
 
     # tail
     arrival = (g[2] - g[3]) / V_
@@ -139,23 +143,33 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
           + p.Cm_CT * ct + p.Cm_ct2 * (ct + 6.0 * ct * ct) - tail * p.Cm_alpha_tail * (at + p.alpha_tail_stall)
           + p.Cm_at_72 * fast + p.Cm_aileron * da + p.Cm_beta2 * b * b + p.Cm_alpha3 * (a - 0.03) ** 3
           + p.Cm_rotor_wake * ct * (a - 0.03) + p.Cm_alpha_q * (a - 0.03) * qh
-          + 0.1 * p.flap_creep * gone)  # fmt: skip
+          + 0.1 * p.flap_creep * gone + p.Cm_p * ph + p.trim_runs * max(t - 15.0, 0.0) / 25.0)  # fmt: skip
 
     # lateral
     loss = 1.0 - p.damping_separated * share
     fin = 1.0 + p.fin_ct * ct
     cy = (p.CY_0 + p.CY_beta * b + bounded(p.CY_beta_soft, b, 0.25) + p.CY_p * ph + p.CY_r * rh
-          + (p.CY_rudder + p.CY_alpha_rudder * (a - 0.03)) * dr)  # fmt: skip
+          + (p.CY_rudder + p.CY_alpha_rudder * (a - 0.03)) * dr + p.CY_aileron * da)  # fmt: skip
     cl = (p.Cl_0 + p.Cl_alpha * a + p.Cl_beta * b + bounded(p.Cl_beta_soft, b, 0.25) + p.Cl_r * rh + p.Cl_rudder * dr
           + loss * (p.Cl_p * ph + bounded(p.Cl_p_soft, ph, 0.1) + p.Cl_aileron * da
                     + bounded(p.Cl_aileron_soft, da, 0.3))
           + p.lift_arm * 0.5 * (zr - zl) + p.Cl_at_72 * fast + p.Cl_torque * ct
           + p.Cl_alpha_p * (a - 0.03) * ph + p.Cl_wave * math.sin(2.0 * math.pi * t / 7.0)
-          + p.Cl_beta_load * b * load + p.wake * math.exp(-((t - 22.0) ** 2)))  # fmt: skip
+          + p.Cl_beta_load * b * load + p.wake * math.exp(-((t - 22.0) ** 2))
+          + p.Cl_ct_aileron * ct * da + (p.spoiler if t > 25.0 else 0.0))  # fmt: skip
     cn = (p.Cn_0 + fin * (p.Cn_beta * b + p.Cn_rudder * dr) + bounded(p.Cn_beta_soft, b, 0.25) + p.Cn_p * ph
           + p.Cn_r * rh + p.Cn_aileron * da + bounded(p.Cn_rudder_soft, dr, 0.25) - p.lift_arm * 0.5 * (xr - xl)
           + p.Cn_betadot * (b - y[BLAG]) / 0.1 * p.span / (2.0 * V_) + p.Cn_pfactor * a * ct
           + p.Cn_alpha_aileron * a * da)  # fmt: skip
+
+    # what a description of something unknown adds, docs/model.md 9
+    cx += p.CX_elevator * de + p.CX_airspeed * V_ + p.CX_time * t
+    cy += p.CY_alpha_beta * a * b + p.CY_airspeed * V_ + p.CY_time * t
+    cz += p.CZ_alpha2 * a * a + p.CZ_airspeed * V_ + p.CZ_time * t
+    cl += p.Cl_alpha_beta * a * b + p.Cl_airspeed * V_ + p.Cl_airspeed2 * V_ * V_ + p.Cl_time * t
+    cm += p.Cm_alpha2 * a * a + p.Cm_alpha_elevator * a * de + p.Cm_airspeed * V_ + p.Cm_airspeed2 * V_ * V_
+    cm += p.Cm_time * t
+    cn += p.Cn_alpha_beta * a * b + p.Cn_airspeed * V_ + p.Cn_airspeed2 * V_ * V_ + p.Cn_time * t
 
     # forces, moments about the c.g., rigid body
     X, Y, Z = qS * cx + thrust, qS * cy, qS * cz
@@ -164,11 +178,11 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     X += p.surge * thrust * math.sin(2.0 * math.pi * t / 3.0)
     L = qS * p.span * cl - aside * Z + p.cg_shift_z * Y + p.slosh_mass * 9.8 * 2.5 * y[SLOSH]
     Y = Y + slosh
-    ahead = p.cg_shift_x + p.loose_load * y[THETA] + p.fuel_surge * X / p.mass
+    ahead = p.cg_shift_x + p.loose_load * y[THETA] + p.fuel_surge * X / mass
     M = (qS * p.chord * cm - p.cg_shift_z * X + ahead * Z
          + p.engine_arm_z * thrust + p.gyroscopic * y[R])  # fmt: skip
     N = qS * p.span * cn - p.cg_shift_x * Y + aside * X + p.engine_arm_y * (tl - tr) - p.gyroscopic * y[Q]
-    fx, fy, fz = X / p.mass, Y / p.mass, Z / p.mass
+    fx, fy, fz = X / mass, Y / mass, Z / mass
     Ix, Iy, Iz, Ixz = p.inertia_xx, p.inertia_yy, p.inertia_zz, p.inertia_xz
     roll = L + Ixz * y[P] * y[Q] + (Iy - Iz) * y[Q] * y[R]
     yaw = N - Ixz * y[Q] * y[R] + (Ix - Iy) * y[P] * y[Q]
@@ -191,7 +205,7 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
     ta = p.aileron_gearing * ta + p.aileron_cubic * ta * (ta / 0.1) ** 2
     ta = y[DA] if abs(ta - y[DA]) < p.aileron_friction else ta
     tu = p.rudder_gearing * u[2] + p.rudder_cubic * u[2] * (u[2] / 0.1) ** 2
-    tu += p.rudder_one_sided * max(u[2], 0.0) + p.rudder_of_aileron * u[1] + p.yaw_damper * y[R]
+    tu += p.rudder_one_sided * max(u[2], 0.0) + p.rudder_of_aileron * u[1] + p.yaw_damper * y[R] + p.rudder_floats * b
     lag = p.elevator_lag + (p.elevator_up_lag if te < y[DE] else 0.0)
     d[DE], d[DE1] = surface(y[DE], y[DE1], te, p.elevator_min, p.elevator_max, lag, p.elevator_rate,
                             p.elevator_frequency, p.elevator_soft_rate)  # fmt: skip
@@ -206,7 +220,8 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
         wl, wr = y[PL2], y[PR2]
     else:
         d[PL2], d[PR2] = 0.0, 0.0
-    d[PL], d[PR] = (wl - y[PL]) / p.spool_time, (wr - y[PR]) / p.spool_time
+    d[PL] = (wl - y[PL]) / (p.spool_time + (p.spool_down if wl < y[PL] else 0.0))
+    d[PR] = (wr - y[PR]) / (p.spool_time + (p.spool_down if wr < y[PR] else 0.0))
 
     # lags and oscillators
     d[ADW] = (a - y[ADW]) * V_ / p.tail_arm

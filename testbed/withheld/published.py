@@ -43,9 +43,11 @@ KNOBS = (
     "CD_beta2", "CZ_beta2", "Cm_alpha_q", "Cl_alpha_p", "CZ_ct_alpha", "Cl_wave", "loose_load", "rudder_one_sided",
     "rudder_of_aileron", "flap_creep", "door", "fuel_shift", "aileron_brake", "surge", "elevator_up_lag", "front",
     "yaw_damper", "CZ_hysteresis", "CZ_aileron_abs", "fuel_surge", "Cl_beta_load", "wake", "thermal", "elevator_hunt",
-    "aileron_friction", "left_of_alpha")  # fmt: skip
+    "aileron_friction", "left_of_alpha", "Cm_p", "elevator_drag", "CY_aileron", "trim_runs", "spoiler", "load_dropped",
+    "rudder_floats", "spool_down", "side_wind_wave", "Cl_ct_aileron")  # fmt: skip
 SENSOR_KNOBS = (
-    "bias_alpha", "bias_beta", "bias_q", "bias_theta", "bias_ax", "bias_az",
+    "bias_alpha", "bias_beta", "bias_q", "bias_theta", "bias_ax", "bias_az", "bias_airspeed", "bias_p", "bias_r",
+    "bias_phi", "bias_ay",
     "wander_alpha", "wander_beta", "wander_q", "wander_theta", "wander_ax", "wander_az",  # bias that changes in time
     "scale_alpha", "scale_alpha2", "scale_airspeed", "pressure_airspeed", "vane_extra", "vane_second",
     "vane_error", "vane_cross", "boom_extra", "boom_other",
@@ -53,7 +55,8 @@ SENSOR_KNOBS = (
     "flexible_az", "gyro_g", "gyro_cross", "attitude_cross", "airspeed_alpha",
     # strangers
     "stuck_alpha", "square_az", "scale_p", "scale_phi", "scale_beta", "sideslip_airspeed", "power_alpha",
-    "stuck_theta", "static_alpha", "tilt", "vane_aside", "warm_p", "pitot_water", "static_lag")  # fmt: skip
+    "stuck_theta", "static_alpha", "tilt", "vane_aside", "warm_p", "pitot_water", "static_lag",
+    "power_beta", "arm_az", "lag_r", "square_phi")  # fmt: skip
 
 
 def folder() -> Path:

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import re
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from itertools import repeat
+from itertools import product, repeat
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,11 @@ from testbed.withheld.windows import gap_of, held
 from testbed.workers import a_core_each
 
 FLOWN_AGAIN = ("single", "pair")  # tiers with an effect that the library holds
-LINES = {*DERIVATIVES, *SENSOR_KNOBS, "CY_0", "Cl_0", "Cn_0", "Cl_alpha"}  # numbers that the plant has, to add to
+# What describes something unknown; and all that the plant has to add to: derivatives, constants, instruments' errors.
+DESCRIBED = ("CX_elevator", "CZ_alpha2", "Cm_alpha2", "Cm_alpha_elevator", "CY_alpha_beta", "Cl_alpha_beta",
+             "Cn_alpha_beta", "Cl_airspeed2", "Cm_airspeed2", "Cn_airspeed2",
+             *(f"{c}_{of}" for c in ("CX", "CY", "CZ", "Cl", "Cm", "Cn") for of in ("airspeed", "time")))  # fmt: skip
+NUMBERS = {*DERIVATIVES, *SENSOR_KNOBS, *DESCRIBED, "CY_0", "Cl_0", "Cn_0", "Cl_alpha"}
 Parts = tuple[tuple[str, str, float], ...]
 
 
@@ -117,7 +122,7 @@ def told(answer: dict[str, Any]) -> Told:
         if name == "derivatives":
             factors |= {key: 1.0 + value for key, value in values.items()}
         elif name == "discrepancy":
-            more, missing = linear(values)
+            more, missing = numbers(values)
             terms |= more
             lacking += missing
         else:
@@ -139,33 +144,38 @@ def _effects(command: str) -> list[tuple[str, dict[str, float]]]:
     return found
 
 
-def linear(values: dict[str, float]) -> tuple[dict[str, float], list[str]]:
-    """Terms of `discrepancy` as numbers of the generator, multiplied out about `at_*`, and those that it lacks.
-
-    Coefficients are lines in angles, rates and surfaces here (the axial one a parabola in alpha), channels have a bias
-    and some a scale.
-    """
+def numbers(values: dict[str, float]) -> tuple[dict[str, float], list[str]]:
+    """Terms of `discrepancy` as numbers of the generator, and those that it lacks: delays, drifts, some scales."""
     found, lacking = dict[str, float](), list[str]()
     for name, value in values.items():
         if value == 0.0 or name.startswith("at_"):
             continue
         of, _, term = name.partition("_")
-        factors = [] if of in ("bias", "scale") or term == "0" else term.split("_")
-        about = [values.get(f"at_{factor}", 0.0) for factor in factors]
-        more = {name: value}
         if of == "scale":
-            more[f"bias_{term}"] = -value * values.get(f"at_{term}", 0.0)
-        elif factors == ["alpha", "alpha"]:
-            more = {f"{of}_alpha2": value, f"{of}_alpha": -2.0 * value * about[0], f"{of}_0": value * about[0] ** 2}
-        elif len(factors) == 1:
-            more[f"{of}_0"] = -value * about[0]
+            more = {name: value, f"bias_{term}": -value * values.get(f"at_{term}", 0.0)}
+        elif of in ("bias", "delay", "drift"):
+            more = {name: value}
+        else:
+            more = written_out(of, [] if term == "0" else term.split("_"), value, values)
         more = {key: added for key, added in more.items() if added != 0.0}
-        if not set(more) <= LINES:
+        if not set(more) <= NUMBERS:
             lacking.append(f"discrepancy.{name}")
             continue
         for key, added in more.items():
             found[key] = found.get(key, 0.0) + added
     return found, lacking
+
+
+def written_out(coefficient: str, factors: list[str], value: float, values: dict[str, float]) -> dict[str, float]:
+    """A product of deviations from what `values` has as `at_*`, multiplied out."""
+    found = dict[str, float]()
+    for kept in product((True, False), repeat=len(factors)):
+        left = "_".join(f for f, keep in zip(factors, kept, strict=True) if keep) or "0"
+        left = {"alpha_alpha": "alpha2", "airspeed_airspeed": "airspeed2"}.get(left, left)
+        about = [-values.get(f"at_{f}", 0.0) for f, keep in zip(factors, kept, strict=True) if not keep]
+        name = f"{coefficient}_{left}"
+        found[name] = found.get(name, 0.0) + value * math.prod(about)
+    return found
 
 
 def main() -> None:
