@@ -7,13 +7,19 @@ them. Whoever mends a solver by what it said of STRANGERS makes them MET, and ta
 from __future__ import annotations
 
 from testbed.withheld.effects import Effect, Form, plus, sense, times
+from testbed.withheld.published import PUBLISHED
 
 
 def _one(name: str, where: tuple[str, ...], typical: float, form: Form, signed: bool = True) -> Effect:
     return Effect(name, where, "size", typical, form, form, signed)
 
 
-MET: tuple[Effect, ...] = (  # by the solvers of 26 November 2026: the first list, then (from flap_creeps on) the second
+def about(slope: str, curved: str) -> Form:
+    """A derivative that changes with the angle of attack, as published at 0.03 rad."""
+    return lambda s: ({slope: PUBLISHED[slope] - 0.03 * s, curved: s}, {})
+
+
+MET: tuple[Effect, ...] = (  # by the solvers of 26 November 2026: three lists
     _one("drag_of_sideslip", ("x_force",), 1.5, plus("CD_beta2"), False),  # per rad2
     _one("lift_of_sideslip", ("z_force",), 6.0, plus("CZ_beta2")),  # per rad2: the fuselage shades the wing
     _one("roll_of_yaw_rate", ("rolling_moment",), 0.8, times("Cl_r")),
@@ -45,8 +51,6 @@ MET: tuple[Effect, ...] = (  # by the solvers of 26 November 2026: the first lis
     _one("elevator_slow_up", ("elevator_path",), 0.12, plus("elevator_up_lag"), False),  # s more, trailing edge up
     _one("wind_front", ("wind",), 4.0, plus("front")),  # m/s, passing at 20 s
     _one("yaw_damper", ("rudder_path",), 0.3, plus("yaw_damper")),  # s: hidden from the command
-)
-STRANGERS: tuple[Effect, ...] = (
     _one("lift_hysteresis", ("z_force",), -0.02, plus("CZ_hysteresis")),  # CZ more while alpha grows
     _one("aileron_lift", ("z_force",), 0.3, plus("CZ_aileron_abs")),  # per rad, either way
     _one("fuel_surges", ("mass", "pitching_moment"), -0.03, plus("fuel_surge"), False),  # m aft per m/s2 ahead
@@ -60,5 +64,23 @@ STRANGERS: tuple[Effect, ...] = (
     _one("water_in_pitot", ("sensor:airspeed",), -0.05, sense("pitot_water"), False),  # share, three seconds at 18 s
     _one("slow_static", ("sensor:altitude",), 3.0, sense("static_lag"), False),  # s
     _one("left_propeller_at_alpha", ("propulsion",), -1.5, plus("left_of_alpha")),  # share of its thrust per rad
+)
+STRANGERS: tuple[Effect, ...] = (
+    _one("dihedral_at_alpha", ("rolling_moment",), 1.5, about("Cl_beta", "Cl_alpha_beta")),  # per rad2
+    _one("directional_stability_at_alpha", ("yawing_moment",), 1.5, about("Cn_beta", "Cn_alpha_beta")),  # per rad2
+    _one("pitch_of_roll_rate", ("pitching_moment",), 1.0, plus("Cm_p")),  # per unit of p b/2V
+    _one("elevator_drag", ("x_force",), 0.8, plus("elevator_drag"), False),  # per rad2
+    _one("side_force_of_ailerons", ("y_force",), 0.1, plus("CY_aileron")),  # per rad
+    _one("trim_runs_away", ("pitching_moment",), 0.05, plus("trim_runs")),  # moment coefficient, from 15 to 40 s
+    _one("spoiler_pops", ("rolling_moment",), 0.004, plus("spoiler")),  # moment coefficient from 25 s on
+    _one("load_dropped", ("mass",), 0.08, plus("load_dropped"), False),  # share of the mass at 20 s
+    _one("rudder_floats", ("rudder_path",), 0.15, plus("rudder_floats")),  # rad per rad of sideslip
+    _one("spools_down_slowly", ("propulsion",), 1.0, plus("spool_down"), False),  # s more, power falling
+    _one("side_wind_wave", ("wind",), 3.0, plus("side_wind_wave")),  # m/s, every 12 s
+    _one("ailerons_in_slipstream", ("rolling_moment",), -0.6, plus("Cl_ct_aileron")),  # per rad and thrust coefficient
+    _one("sideslip_vane_in_slipstream", ("sensor:beta",), 0.1, sense("power_beta")),  # rad per thrust coefficient
+    _one("accelerometer_off_centre", ("sensor:az",), -1.0, sense("arm_az")),  # m ahead of the c.g.
+    _one("yaw_gyro_lags", ("sensor:r",), 0.2, sense("lag_r"), False),  # s
+    _one("attitude_of_bank", ("sensor:theta",), 0.1, sense("square_phi")),  # per rad
 )
 BY_NAME = {effect.name: effect for effect in (*MET, *STRANGERS)}
