@@ -122,7 +122,7 @@ def loads(x: Any, air: tuple, s: Any, c: Any, p: Any) -> tuple:
     cm -= tail*p.Cm_alpha_tail*(alpha_tail + c.alpha_tail_stall)
     cl += 0.5*p.lift_arm*(lift_right - lift_left)
     cn -= 0.5*p.lift_arm*(axial_right - axial_left)
-    more_x, more_y, more_z, more_l, more_m, more_n = discrepancy(alpha, beta, airspeed, x, c, p)
+    more_x, more_y, more_z, more_l, more_m, more_n = discrepancy(alpha, beta, phat, qhat, rhat, airspeed, x, c, p)
 
     bluff = 0.5*density*airspeed*p.wing_area*c.CD_parasite
     fx = qs*(0.5*(axial_left + axial_right) + rest_x + more_x) - bluff*ua + thrust

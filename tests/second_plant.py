@@ -179,7 +179,7 @@ def longitudinal(x: Record, a: Record, f: Record, h: Record, ct: Any, c: Record,
     CX += p.CX_elevator * x.elevator + p.CX_airspeed * a.V + p.CX_time * c.elapsed
     CZ = (Z_wing - flap_lift * a.cos_a - flap_drag * a.sin_a
           + c.CZ_q * a.qhat + c.CZ_elevator * x.elevator + p.CZ_CT * ct + low * p.ground_lift * Z_wing)  # fmt: skip
-    CZ += p.CZ_alpha2 * a.alpha**2 + p.CZ_airspeed * a.V + p.CZ_time * c.elapsed
+    CZ += p.CZ_alpha2 * a.alpha**2 + p.CZ_alpha3 * a.alpha**3 + p.CZ_airspeed * a.V + p.CZ_time * c.elapsed
     Cm = (c.Cm_0 + c.Cm_alpha * ((1 - f.share) * a.alpha + f.share * p.Cm_alpha_separated * a.sin_a)
           + (c.Cm_q - p.Cm_alphadot) * a.qhat
           + p.Cm_alphadot * (p.chord / (2 * p.tail_arm)) * (a.alpha - x.alpha_downwash)
@@ -187,7 +187,8 @@ def longitudinal(x: Record, a: Record, f: Record, h: Record, ct: Any, c: Record,
           + c.Cm_elevator * x.elevator * (1 + p.Cm_elevator_CT * ct) * (1 - p.tail_stall_elevator_loss * f.tail)
           + p.Cm_flap * x.flap + p.Cm_CT * ct + low * p.ground_moment
           - f.tail * p.Cm_alpha_tail * (f.alpha_tail + c.alpha_tail_stall))  # fmt: skip
-    Cm += p.Cm_alpha2 * a.alpha**2 + p.Cm_alpha_elevator * a.alpha * x.elevator
+    Cm += p.Cm_alpha2 * a.alpha**2 + p.Cm_alpha3 * a.alpha**3 + p.Cm_alpha_elevator * a.alpha * x.elevator
+    Cm += p.Cm_elevator2 * x.elevator**2 + p.Cm_elevator3 * x.elevator**3 + p.Cm_q3 * a.qhat**3
     return CX, CZ, Cm + p.Cm_airspeed * a.V + p.Cm_airspeed2 * a.V**2 + p.Cm_time * c.elapsed
 
 
@@ -200,8 +201,10 @@ def lateral(x: Record, a: Record, f: Record, h: Record, c: Record, p: Record) ->
     Cn = (p.Cn_0 + c.Cn_beta * a.beta + c.Cn_p * a.phat + c.Cn_r * a.rhat + c.Cn_aileron * x.aileron
           + c.Cn_rudder * x.rudder - p.lift_arm * (h.X_right - h.X_left) / 2)  # fmt: skip
     ab, t = a.alpha * a.beta, c.elapsed
-    CY += p.CY_alpha_beta * ab + p.CY_airspeed * a.V + p.CY_time * t
+    CY += p.CY_beta3 * a.beta**3 + p.CY_alpha_beta * ab + p.CY_airspeed * a.V + p.CY_time * t
+    Cl += p.Cl_beta3 * a.beta**3 + p.Cl_p3 * a.phat**3 + p.Cl_aileron3 * x.aileron**3
     Cl += p.Cl_alpha_beta * ab + p.Cl_airspeed * a.V + p.Cl_airspeed2 * a.V**2 + p.Cl_time * t
+    Cn += p.Cn_beta3 * a.beta**3 + p.Cn_r3 * a.rhat**3 + p.Cn_rudder3 * x.rudder**3
     Cn += p.Cn_alpha_beta * ab + p.Cn_airspeed * a.V + p.Cn_airspeed2 * a.V**2 + p.Cn_time * t
     return CY, Cl, Cn
 

@@ -16,19 +16,20 @@ from icing_env.effects.effect import Effect, Parameter, Values
 from icing_env.sensors import BIASED, DELAYED, DRIFTING, SCALED
 from icing_env.types import unit_of
 
-SIDEWAYS = ("0", "beta", "p", "r", "aileron", "rudder", "alpha_beta", "airspeed", "airspeed_airspeed", "time")
+SIDEWAYS = ("0", "beta", "p", "r", "aileron", "rudder", "alpha_beta", "beta_beta_beta", "airspeed", "airspeed_airspeed",
+            "time")  # fmt: skip
 TERMS: dict[str, tuple[str, ...]] = {
     "CX": ("0", "alpha", "alpha_alpha", "elevator", "airspeed", "time"),
-    "CY": tuple(term for term in SIDEWAYS if term not in ("aileron", "airspeed_airspeed")),
-    "CZ": ("0", "alpha", "q", "elevator", "alpha_alpha", "airspeed", "time"),
-    "Cl": SIDEWAYS,
-    "Cm": ("0", "alpha", "q", "elevator", "alpha_alpha", "alpha_elevator", "airspeed", "airspeed_airspeed", "time"),
-    "Cn": SIDEWAYS,
+    "CY": ("0", "beta", "p", "r", "rudder", "alpha_beta", "beta_beta_beta", "airspeed", "time"),
+    "CZ": ("0", "alpha", "q", "elevator", "alpha_alpha", "alpha_alpha_alpha", "airspeed", "time"),
+    "Cl": (*SIDEWAYS, "p_p_p", "aileron_aileron_aileron"),
+    "Cm": ("0", "alpha", "q", "elevator", "alpha_alpha", "alpha_elevator", "alpha_alpha_alpha",
+           "elevator_elevator_elevator", "q_q_q", "airspeed", "airspeed_airspeed", "time"),
+    "Cn": (*SIDEWAYS, "r_r_r", "rudder_rudder_rudder"),
 }
 AT = {"alpha": "rad", "elevator": "rad", "airspeed": "m/s", "time": "s", "phi": "rad", "theta": "rad", "ax": "m/s2",
       "ay": "m/s2", "az": "m/s2", "altitude": "m"}  # fmt: skip
 CHANNELS = DRIFTING  # those of which an error can be described: airspeed to altitude
-SQUARES = {"alpha_alpha": "alpha2", "airspeed_airspeed": "airspeed2"}  # as the parameters are named
 LARGEST = 1e3  # either way, of everything (no range is searched)
 
 
@@ -56,15 +57,15 @@ def _add(p: NDArray, coefficient: str, factors: tuple[str, ...], values: Values)
         for factor, keep in zip(factors, kept, strict=True):
             if not keep:
                 change = -change*values[f"at_{factor}"]
-        name = "_".join(left) or "0"
-        p[f"{coefficient}_{SQUARES.get(name, name)}"] += change
+        power = len(left) > 1 and len(set(left)) == 1
+        p[f"{coefficient}_{f'{left[0]}{len(left)}' if power else '_'.join(left) or '0'}"] += change
 
 
 def unit(coefficient: str, term: str) -> str:
     """Unit of one term's size: per rad of every angle and normalised rate, per m/s, per s."""
     if term in (units := {"airspeed": "s/m", "airspeed_airspeed": "s2/m2", "time": "1/s"}):
         return units[term]
-    return "1/rad2" if "_" in term else unit_of(f"{coefficient}_{term}")
+    return f"1/rad{term.count('_') + 1}" if "_" in term else unit_of(f"{coefficient}_{term}")
 
 
 def _number(name: str, unit: str) -> Parameter:

@@ -141,7 +141,7 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
           + (p.Cm_elevator * de + bounded(p.Cm_elevator_soft, de, 0.2)) * (1.0 + p.Cm_elevator_CT * ct)
           * (1.0 - p.tail_stall_elevator_loss * tail)
           + p.Cm_CT * ct + p.Cm_ct2 * (ct + 6.0 * ct * ct) - tail * p.Cm_alpha_tail * (at + p.alpha_tail_stall)
-          + p.Cm_at_72 * fast + p.Cm_aileron * da + p.Cm_beta2 * b * b + p.Cm_alpha3 * (a - 0.03) ** 3
+          + p.Cm_at_72 * fast + p.Cm_aileron * da + p.Cm_beta2 * b * b + p.Cm_hump * (a - 0.03) ** 3
           + p.Cm_rotor_wake * ct * (a - 0.03) + p.Cm_alpha_q * (a - 0.03) * qh
           + 0.1 * p.flap_creep * gone + p.Cm_p * ph + p.trim_runs * max(t - 15.0, 0.0) / 25.0)  # fmt: skip
 
@@ -164,11 +164,13 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
 
     # what a description of something unknown adds, docs/model.md 9
     cx += p.CX_elevator * de + p.CX_airspeed * V_ + p.CX_time * t
-    cy += p.CY_alpha_beta * a * b + p.CY_airspeed * V_ + p.CY_time * t
-    cz += p.CZ_alpha2 * a * a + p.CZ_airspeed * V_ + p.CZ_time * t
+    cy += p.CY_alpha_beta * a * b + p.CY_beta3 * b**3 + p.CY_airspeed * V_ + p.CY_time * t
+    cz += p.CZ_alpha2 * a * a + p.CZ_alpha3 * a**3 + p.CZ_airspeed * V_ + p.CZ_time * t
+    cl += p.Cl_beta3 * b**3 + p.Cl_p3 * ph**3 + p.Cl_aileron3 * da**3
     cl += p.Cl_alpha_beta * a * b + p.Cl_airspeed * V_ + p.Cl_airspeed2 * V_ * V_ + p.Cl_time * t
     cm += p.Cm_alpha2 * a * a + p.Cm_alpha_elevator * a * de + p.Cm_airspeed * V_ + p.Cm_airspeed2 * V_ * V_
-    cm += p.Cm_time * t
+    cm += p.Cm_alpha3 * a**3 + p.Cm_elevator2 * de * de + p.Cm_elevator3 * de**3 + p.Cm_q3 * qh**3 + p.Cm_time * t
+    cn += p.Cn_beta3 * b**3 + p.Cn_r3 * rh**3 + p.Cn_rudder3 * dr**3
     cn += p.Cn_alpha_beta * a * b + p.Cn_airspeed * V_ + p.Cn_airspeed2 * V_ * V_ + p.Cn_time * t
 
     # forces, moments about the c.g., rigid body

@@ -36,7 +36,7 @@ KNOBS = (
     "elevator_float", "elevator_soft_rate",  # rad at 72; 0/1: rate limit as tanh
     "wind_up", "wind_wave", "shear", "shear_bounded", "density_lapse", "altitude_start",
     # effects that are in no library
-    "Cm_aileron", "Cm_beta2", "Cm_alpha3", "fin_ct", "slosh_mass", "elevator_play", "Cn_betadot", "Cl_torque",
+    "Cm_aileron", "Cm_beta2", "Cm_hump", "fin_ct", "slosh_mass", "elevator_play", "Cn_betadot", "Cl_torque",
     "Cn_pfactor", "blowback", "Cn_alpha_aileron", "gyroscopic", "CZ_alphadot", "aileron_dead", "elevator_delay",
     "Cm_rotor_wake", "CY_alpha_rudder", "brake_drag",
     # strangers, in no list until a solver was done (`strangers.py`)

@@ -33,8 +33,9 @@ from testbed.workers import a_core_each
 
 FLOWN_AGAIN = ("single", "pair")  # tiers with an effect that the library holds
 # What describes something unknown; and all that the plant has to add to: derivatives, constants, instruments' errors.
-DESCRIBED = ("CX_elevator", "CZ_alpha2", "Cm_alpha2", "Cm_alpha_elevator", "CY_alpha_beta", "Cl_alpha_beta",
-             "Cn_alpha_beta", "Cl_airspeed2", "Cm_airspeed2", "Cn_airspeed2",
+DESCRIBED = ("CX_elevator", "CZ_alpha2", "Cm_alpha2", "Cm_elevator2", "Cm_alpha_elevator", "CY_alpha_beta",
+             "Cl_alpha_beta", "Cn_alpha_beta", "Cl_airspeed2", "Cm_airspeed2", "Cn_airspeed2", "CZ_alpha3", "Cm_alpha3",
+             "Cm_elevator3", "Cm_q3", "CY_beta3", "Cl_beta3", "Cl_p3", "Cl_aileron3", "Cn_beta3", "Cn_r3", "Cn_rudder3",
              *(f"{c}_{of}" for c in ("CX", "CY", "CZ", "Cl", "Cm", "Cn") for of in ("airspeed", "time")))  # fmt: skip
 NUMBERS = {*DERIVATIVES, *SENSOR_KNOBS, *DESCRIBED, "CY_0", "Cl_0", "Cn_0", "Cl_alpha"}
 Parts = tuple[tuple[str, str, float], ...]
@@ -170,10 +171,10 @@ def written_out(coefficient: str, factors: list[str], value: float, values: dict
     """A product of deviations from what `values` has as `at_*`, multiplied out."""
     found = dict[str, float]()
     for kept in product((True, False), repeat=len(factors)):
-        left = "_".join(f for f, keep in zip(factors, kept, strict=True) if keep) or "0"
-        left = {"alpha_alpha": "alpha2", "airspeed_airspeed": "airspeed2"}.get(left, left)
+        left = [f for f, keep in zip(factors, kept, strict=True) if keep]
+        power = len(left) > 1 and len(set(left)) == 1
         about = [-values.get(f"at_{f}", 0.0) for f, keep in zip(factors, kept, strict=True) if not keep]
-        name = f"{coefficient}_{left}"
+        name = f"{coefficient}_{f'{left[0]}{len(left)}' if power else '_'.join(left) or '0'}"
         found[name] = found.get(name, 0.0) + value * math.prod(about)
     return found
 

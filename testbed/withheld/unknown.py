@@ -16,7 +16,7 @@ def _one(name: str, where: tuple[str, ...], typical: float, form: Form, signed: 
 UNKNOWN: tuple[Effect, ...] = (
     _one("aileron_pitching", ("pitching_moment",), 0.12, plus("Cm_aileron")),  # per rad: ailerons pitch the aircraft
     _one("sideslip_pitching", ("pitching_moment",), 4.0, plus("Cm_beta2")),  # per rad2
-    _one("cubic_pitching", ("pitching_moment",), -30.0, plus("Cm_alpha3"), False),  # per rad3 about alpha = 0.03
+    _one("cubic_pitching", ("pitching_moment",), -30.0, plus("Cm_hump"), False),  # per rad3 about alpha = 0.03
     _one("wake_on_tail", ("pitching_moment",), 8.0, plus("Cm_rotor_wake")),  # slipstream times alpha on the tail
     _one("slipstream_on_fin", ("yawing_moment",), 5.0, plus("fin_ct")),  # fin power grows with thrust coefficient
     _one("fuel_slosh", ("rolling_moment", "y_force"), 250.0, plus("slosh_mass"), False),  # kg that swing in the wing
