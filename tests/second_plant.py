@@ -171,8 +171,7 @@ def half_wings(a: Record, f: Record, c: Record) -> Record:
 
 def longitudinal(x: Record, a: Record, f: Record, h: Record, ct: Any, c: Record, p: Record) -> tuple[Any, Any, Any]:
     """CX, CZ, Cm."""
-    low = p.span**2 / (p.span**2 + (16 * (x.altitude - p.ground_altitude)) ** 2)
-    Z_wing = (h.Z_left + h.Z_right) / 2
+    low, Z_wing = p.span**2 / (p.span**2 + (16 * (x.altitude - p.ground_altitude)) ** 2), (h.Z_left + h.Z_right) / 2
     flap_lift = (1 - f.share) * p.CL_flap * x.flap
     flap_drag = p.CD_flap * x.flap + p.induced_drag * flap_lift * (flap_lift - 2 * Z_wing)
     CX = (h.X_left + h.X_right) / 2 + flap_lift * a.sin_a - flap_drag * a.cos_a + low * p.induced_drag * Z_wing**2
@@ -181,9 +180,8 @@ def longitudinal(x: Record, a: Record, f: Record, h: Record, ct: Any, c: Record,
           + c.CZ_q * a.qhat + c.CZ_elevator * x.elevator + p.CZ_CT * ct + low * p.ground_lift * Z_wing)  # fmt: skip
     CZ += p.CZ_alpha2 * a.alpha**2 + p.CZ_alpha3 * a.alpha**3 + p.CZ_airspeed * a.V + p.CZ_time * c.elapsed
     Cm = (c.Cm_0 + c.Cm_alpha * ((1 - f.share) * a.alpha + f.share * p.Cm_alpha_separated * a.sin_a)
-          + (c.Cm_q - p.Cm_alphadot) * a.qhat
+          + (c.Cm_q - p.Cm_alphadot) * a.qhat + p.Cm_alpha_tail * f.arrival
           + p.Cm_alphadot * (p.chord / (2 * p.tail_arm)) * (a.alpha - x.alpha_downwash)
-          + p.Cm_alpha_tail * f.arrival
           + c.Cm_elevator * x.elevator * (1 + p.Cm_elevator_CT * ct) * (1 - p.tail_stall_elevator_loss * f.tail)
           + p.Cm_flap * x.flap + p.Cm_CT * ct + low * p.ground_moment
           - f.tail * p.Cm_alpha_tail * (f.alpha_tail + c.alpha_tail_stall))  # fmt: skip
@@ -200,13 +198,11 @@ def lateral(x: Record, a: Record, f: Record, h: Record, c: Record, p: Record) ->
           + loss * (c.Cl_p * a.phat + c.Cl_aileron * x.aileron) + p.lift_arm * (h.Z_right - h.Z_left) / 2)  # fmt: skip
     Cn = (p.Cn_0 + c.Cn_beta * a.beta + c.Cn_p * a.phat + c.Cn_r * a.rhat + c.Cn_aileron * x.aileron
           + c.Cn_rudder * x.rudder - p.lift_arm * (h.X_right - h.X_left) / 2)  # fmt: skip
-    ab, t = a.alpha * a.beta, c.elapsed
-    CY += p.CY_beta3 * a.beta**3 + p.CY_alpha_beta * ab + p.CY_airspeed * a.V + p.CY_time * t
-    Cl += p.Cl_beta3 * a.beta**3 + p.Cl_p3 * a.phat**3 + p.Cl_aileron3 * x.aileron**3
-    Cl += p.Cl_alpha_beta * ab + p.Cl_airspeed * a.V + p.Cl_airspeed2 * a.V**2 + p.Cl_time * t
-    Cn += p.Cn_beta3 * a.beta**3 + p.Cn_r3 * a.rhat**3 + p.Cn_rudder3 * x.rudder**3
-    Cn += p.Cn_alpha_beta * ab + p.Cn_airspeed * a.V + p.Cn_airspeed2 * a.V**2 + p.Cn_time * t
-    return CY, Cl, Cn
+    ab, b3, V, t = a.alpha * a.beta, a.beta**3, a.V, c.elapsed
+    CY += p.CY_beta3 * b3 + p.CY_alpha_beta * ab + p.CY_airspeed * V + p.CY_time * t
+    Cl += p.Cl_beta3 * b3 + p.Cl_p3 * a.phat**3 + p.Cl_aileron3 * x.aileron**3 + p.Cl_alpha_beta * ab + p.Cl_time * t
+    Cn += p.Cn_beta3 * b3 + p.Cn_r3 * a.rhat**3 + p.Cn_rudder3 * x.rudder**3 + p.Cn_alpha_beta * ab + p.Cn_time * t
+    return CY, Cl + (p.Cl_airspeed + p.Cl_airspeed2 * V) * V, Cn + (p.Cn_airspeed + p.Cn_airspeed2 * V) * V
 
 
 # ---- sections 10 to 13

@@ -47,8 +47,8 @@ GENERIC: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 # Structural modes under an accelerometer: what rings at so many Hz, in phase and a quarter behind. Light transports
 # have their first bending modes there (assumed), and each covers its neighbourhood.
 MODES = tuple(f"{kind}:{hertz:g}" for hertz in (2.0, 3.0, 4.5) for kind in ("rings", "rings_late"))
-# Terms that the effect `discrepancy` cannot fly, and that show where a gap lies nevertheless: across axes, of higher
-# order, in the paths of surfaces (no lags: actuators have their own, and channels are in step to a few ms at best) and
+# Terms that the effect `discrepancy` cannot fly, and that show where a gap lies nevertheless: across axes, with
+# thrust, in the paths of surfaces (no lags: actuators have their own, and channels are in step to a few ms at best) and
 # in the engines.
 BEYOND: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("x_force", "u", ("beta*beta", "rudder*rudder")),
