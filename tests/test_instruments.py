@@ -102,7 +102,7 @@ def test_declared_instruments_are_the_models() -> None:
 
 def test_a_flown_record_declares_the_instruments_it_has() -> None:
     """Through its side file, the model is that of the aircraft file again."""
-    own = fly(scenario.load("clear_air", duration=4.0), observer=False, protection=False).record
+    own = fly(scenario.load("clear_air", duration=6.0), observer=False, protection=False).record
     file, said = reconstruct(stating(own, {})).parameters, reconstruct(own).parameters
     for name in ("vane_lag", "pitot_lag", "boom_gain", "filter_frequency"):
         assert said[name] == pytest.approx(file[name])
