@@ -57,8 +57,14 @@ def _add(p: NDArray, coefficient: str, factors: tuple[str, ...], values: Values)
         for factor, keep in zip(factors, kept, strict=True):
             if not keep:
                 change = -change*values[f"at_{factor}"]
-        power = len(left) > 1 and len(set(left)) == 1
-        p[f"{coefficient}_{f'{left[0]}{len(left)}' if power else '_'.join(left) or '0'}"] += change
+        p[number(coefficient, left)] += change
+
+
+def number(coefficient: str, factors: list[str]) -> str:
+    """The parameter that multiplies a product of quantities: `Cm_0`, `Cm_alpha_elevator`, `Cm_alpha3`."""
+    if len(factors) > 1 and len(set(factors)) == 1:
+        return f"{coefficient}_{factors[0]}{len(factors)}"
+    return f"{coefficient}_{'_'.join(factors) or '0'}"
 
 
 def unit(coefficient: str, term: str) -> str:

@@ -21,6 +21,7 @@ from sim2real.posterior.sets import firm
 from sim2real.prediction.predictor import Predictor, held, lost
 from sim2real.records.channels import MEASURED
 from sim2real.records.reconstruct import Reconstruction
+from sim2real.records.side_by_side import each
 from sim2real.signatures.evidence import Evidence
 from sim2real.signatures.means import without_means
 from sim2real.signatures.whitening import FARTHEST, SETTLE, departures
@@ -135,6 +136,18 @@ def turned(gram: FloatArray, signs: FloatArray) -> FloatArray:
     """Inner products as if every step, the last rows, had been taken forwards; responses are linear that near."""
     back = np.r_[np.ones(len(gram) - signs.size), signs.ravel()]
     return gram * back * back[:, None]
+
+
+def flown_products(evidences: Sequence[Evidence], rows: Sequence[NDArray], cuts: Sequence[NDArray[np.intp]],
+                   signs: FloatArray, precision: FloatArray, nuisances: FloatArray, tempering: float
+                   ) -> FloatArray:  # fmt: skip
+    """`products` of all records flown, every step as if it had been taken forwards.
+
+    Args:
+        rows, cuts: as for `responses`, of every record.
+        signs: 1 or -1 by which each step of `rows` was multiplied (see `inwards`).
+    """
+    return turned(products(each(responses, evidences, rows, cuts), precision, nuisances, tempering), signs)
 
 
 def without(gram: FloatArray, steps: FloatArray) -> FloatArray:

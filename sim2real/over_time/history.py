@@ -22,23 +22,10 @@ from sim2real.closing.discrepancy import moved_by
 from sim2real.closing.remedy import Remedy
 from sim2real.flown.steps import ranges, size_steps
 from sim2real.library.candidates import Bank, shifted
-from sim2real.over_time.by_stretch import (
-    SHARED,
-    Way,
-    cut_up,
-    gaussian,
-    inwards,
-    products,
-    responses,
-    spans,
-    turned,
-    ways,
-    without,
-)
+from sim2real.over_time.by_stretch import SHARED, Way, cut_up, flown_products, gaussian, inwards, spans, ways, without
 from sim2real.posterior.hypotheses import Posterior
 from sim2real.posterior.sets import SetFit
 from sim2real.records.reconstruct import Reconstruction
-from sim2real.records.side_by_side import each
 from sim2real.signatures.courses import projected
 from sim2real.signatures.evidence import Evidence
 
@@ -104,8 +91,7 @@ def histories(flights: Sequence[Reconstruction], candidates: Bank, evidences: Se
         signs = inwards(sizes, steps, low, high)
         rows = [_stepped(flight, candidates, nuisances, fit, change, own, steps * sign)
                 for flight, own, sign in zip(flights, np.split(sizes, at), np.split(signs, at), strict=True)]
-        made = each(responses, evidences, rows, cuts)
-        gram = turned(products(made, baseline.precision, nuisances, posterior.tempering), signs)
+        gram = flown_products(evidences, rows, cuts, signs, baseline.precision, nuisances, posterior.tempering)
         gram = projected(gram, 1 + len(nuisances))
         gram = without(gram, ((sizes - estimate) / steps).ravel())
         found = [_likeliest(gram, m, fit, tried) for m in range(len(steps))]

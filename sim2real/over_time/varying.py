@@ -23,17 +23,7 @@ from sim2real.baseline.references import Baseline
 from sim2real.flown.companions import CERTAIN
 from sim2real.flown.steps import FARTHEST
 from sim2real.library.candidates import Bank, Family, piece_at, shifted, unbroken
-from sim2real.over_time.by_stretch import (
-    Way,
-    cut_up,
-    gaussian,
-    inwards,
-    products,
-    responses,
-    turned,
-    ways,
-    without,
-)
+from sim2real.over_time.by_stretch import Way, cut_up, flown_products, gaussian, inwards, ways, without
 from sim2real.over_time.history import SPREADS
 from sim2real.posterior.any_delay import is_delay
 from sim2real.posterior.form import forgiven
@@ -41,7 +31,6 @@ from sim2real.posterior.generic import COURSE, UnknownFit
 from sim2real.posterior.hypotheses import Hypothesis, Posterior, Settled, normalised
 from sim2real.posterior.sets import SetFit
 from sim2real.records.reconstruct import Reconstruction
-from sim2real.records.side_by_side import each
 from sim2real.signatures.courses import projected
 from sim2real.signatures.evidence import Evidence
 from sim2real.signatures.tempering import noise
@@ -181,8 +170,8 @@ class _Flying:
             signs = inwards(sizes, step, p.low, p.high)
             rows = [_rows(flight, self.candidates, nuisances, family, s, step * sign)
                     for flight, s, sign in zip(self.flights, own, np.split(signs, at), strict=True)]
-            made = each(responses, self.evidences, rows, self.cuts)
-            gram = turned(products(made, self.baseline.precision, nuisances, self.tempering), signs)
+            gram = flown_products(self.evidences, rows, self.cuts, signs, self.baseline.precision, nuisances,
+                                  self.tempering)  # fmt: skip
             found = _best(gram, n, (sizes - p.neutral) / step, self.tried)
             now = np.clip(p.neutral + step * found.sizes, p.low, p.high)
             asked = gram[1 : 1 + n, 0] + gram[1 : 1 + n, 1 + n :] @ (now - sizes) / step

@@ -172,9 +172,9 @@ def written_out(coefficient: str, factors: list[str], value: float, values: dict
     found = dict[str, float]()
     for kept in product((True, False), repeat=len(factors)):
         left = [f for f, keep in zip(factors, kept, strict=True) if keep]
-        power = len(left) > 1 and len(set(left)) == 1
         about = [-values.get(f"at_{f}", 0.0) for f, keep in zip(factors, kept, strict=True) if not keep]
-        name = f"{coefficient}_{f'{left[0]}{len(left)}' if power else '_'.join(left) or '0'}"
+        of = f"{left[0]}{len(left)}" if len(left) > 1 and len(set(left)) == 1 else "_".join(left) or "0"
+        name = f"{coefficient}_{of}"
         found[name] = found.get(name, 0.0) + value * math.prod(about)
     return found
 
