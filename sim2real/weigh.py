@@ -107,7 +107,6 @@ class _Weighing:
     known: gains of the best explanation, once it has been flown; quiet: effects that these records do not show.
     """
 
-    along: list[Course]
     posterior: Posterior
 
     def __init__(self, flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline,
@@ -117,6 +116,7 @@ class _Weighing:
         self.known: list[Gain] | None = None
         self.quiet = dict(untestable)
         self.evidences: list[Evidence] = []
+        self.along: list[Course] = []
         self.points: Points = {}
         self.linear: dict[float, Linear] = {}
         self.places = Places()
@@ -127,6 +127,8 @@ class _Weighing:
         Returns:
             Whether that is believed: with gains of an explanation, the model without it may depart from the records.
         """
+        for course in self.along:
+            course.forget()
         flown = gather_about(self.flights, self.candidates, self.centre, known)
         if departs(flown) and self.evidences:
             return False

@@ -182,7 +182,7 @@ class Flying:
         rows = [rows_of(f, self.candidates, fit, sizes, steps, nuisances)[:count] for f in self.flights]
         made = self._flown(rows, keep=range(count))
         slopes = slopes or self._slopes([own[:, 1 + k :] / NUISANCE_STEP for own in made])
-        made = [own[:, : 1 + k] for own in made]
+        made = [own[:, : 1 + k].copy() for own in made]  # a view would keep what slopes were made of
         for flight, own, left, lent in zip(self.flights, rows, made, slopes, strict=True):
             gram += lent.beside(left) / self.tempering
             gram[: 1 + k, : 1 + k] += path_gram(flight, own[: 1 + k], (), round(SETTLE / flight.dt)) / self.tempering

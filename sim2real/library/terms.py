@@ -128,7 +128,7 @@ def at_any_time(flight: Reconstruction, component: str, first: int) -> list[Term
     """
     target = next(target for where, target, _ in (*GENERIC, *BEYOND) if where == component)
     kinds = {"propulsion": ("both*", "left*"), WIND: ("along*", "across*")}.get(component, ("",))
-    return [Term(component, f"{kind}{KNOT_AT}{t:g}", target, first + i)
+    return [Term(component, f"{kind}{KNOT_AT}{t:.9g}", target, first + i)
             for i, (kind, t) in enumerate(product(kinds, knots(flight)))]
 
 
@@ -199,7 +199,7 @@ def _course(flight: Reconstruction, name: str, aerodynamic: bool = False) -> Flo
     if name == "time":
         return np.linspace(-1.0, 1.0, n)
     if name.startswith(KNOT_AT):
-        return hat(flight.time - flight.time[0], float(name.removeprefix(KNOT_AT)))
+        return hat(flight, float(name.removeprefix(KNOT_AT)))
     out = np.ones(n)
     for factor in name.split("*"):
         values = _values(flight, factor)

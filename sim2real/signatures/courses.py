@@ -17,7 +17,7 @@ from icing_env.record import FloatArray
 from sim2real.actuators.lateness import Late
 from sim2real.actuators.paths import PATHS
 from sim2real.actuators.wandering import Wander
-from sim2real.library.knots import KNOT
+from sim2real.library.knots import knots
 from sim2real.library.terms import WIND, Term, at_any_time, pushes
 from sim2real.prediction.predictor import Push
 from sim2real.records.side_by_side import each
@@ -76,6 +76,10 @@ class Course:
         if evidence.linear is None:
             raise ValueError("candidates were not flown along this record")
         self.evidence, self.about = evidence, evidence.linear
+        self.forget()
+
+    def forget(self) -> None:
+        """Give back what was kept: hundreds of megabytes of some records, and made again when asked for."""
         self._rows: dict[str, FloatArray] = {}
         self._inner: dict[tuple[str, str], FloatArray] = {}
         self._freed: dict[tuple[tuple[str, ...], float], Freed] = {}
@@ -88,8 +92,8 @@ class Course:
 
     @property
     def bytes(self) -> float:
-        """Of what hats at one component make of the record: with its length squared."""
-        return 8.0 * len(self.model) * float(np.ptp(self.about.flight.time)) / KNOT
+        """Of what hats at one component make of the record."""
+        return 8.0 * len(self.model) * len(knots(self.about.flight))
 
     def pushes(self, terms: Sequence[Term]) -> tuple[Push, ...]:
         """Time courses of generic terms along the record as the model predicts it."""
