@@ -114,7 +114,8 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     sizes = dict[str, History]()
     if explained is not None and explained.effects and found.whole is None:
         progress("looking at how the sizes went along the records")
-        sizes = histories(flights, candidates, evidences, baseline, posterior, explained.fit, found.alone)
+        sizes = histories(flights, candidates, evidences, baseline, posterior, explained.fit, found.alone,
+                          found.told.flown)
     progress("flying what these records could have revealed")
     shown = limits(evidences, candidates, baseline, posterior.tempering, posterior.fits)
     sigma = float(np.mean([e.sigma_w for e in evidences]))

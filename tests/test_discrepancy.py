@@ -199,6 +199,15 @@ def test_the_form_of_a_known_effect_is_flown_with_it():
     assert found.gap["held_out"]["closure"] > 0.7
 
 
+def test_a_form_that_goes_with_speed_is_no_size_that_changes():
+    """Derivatives at the component are among the form's terms: moved beside these, they would count twice."""
+    grows = {"Cl_0": 0.006, "Cl_airspeed": 2e-4, "Cl_beta": -0.03, "at_airspeed": 75.0}
+    found = diagnose([record(grows, seed) for seed in (3, 4)])
+    entry = next(e for e in found.effects if e["name"] == "roll_trim")
+    assert "airspeed" in {t["term"] for t in entry["other_form"]["terms"]}
+    assert (entry["scope"], entry["sizes"]) == ("shared", None)
+
+
 def test_what_an_effect_says_little_of_is_not_its_other_form():
     """Beside the model's own numbers a change of trim takes a fifth of it, though both are a pitching moment."""
     found = diagnose([record(BENDS, 3)])

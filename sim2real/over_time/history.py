@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.baseline.references import Baseline
-from sim2real.closing.discrepancy import moved_by
+from sim2real.closing.discrepancy import Description, moved_by
 from sim2real.closing.remedy import Remedy
 from sim2real.flown.steps import ranges, size_steps
 from sim2real.library.candidates import Bank, shifted
@@ -66,7 +66,8 @@ SAME = History()
 
 
 def histories(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
-              posterior: Posterior, fit: SetFit, change: Remedy) -> dict[str, History]:  # fmt: skip
+              posterior: Posterior, fit: SetFit, change: Remedy, described: Description | None = None
+              ) -> dict[str, History]:  # fmt: skip
     """How every effect of an explanation went along the records.
 
     Args:
@@ -77,8 +78,9 @@ def histories(flights: Sequence[Reconstruction], candidates: Bank, evidences: Se
         posterior: what the records say.
         fit: the explanation's effects.
         change: the model's change by these, in the form in which they were found.
+        described: the terms of that form; derivatives at their component are among these, and not moved beside them.
     """
-    nuisances = posterior.settled
+    nuisances = posterior.settled if described is None or described.nuisances is None else described.nuisances
     if nuisances is None:
         nuisances = moved_by(flights[0], evidences[0].flight.parameters, candidates.nuisances)
     cuts = [cut_up(flight) for flight in flights]
