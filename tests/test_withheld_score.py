@@ -144,6 +144,14 @@ def test_calibration_and_auroc_against_numbers_worked_out_by_hand():
     assert score.calibration_error([{"inclusion": [(0.9, False)] * 100}]) == pytest.approx(0.9)
 
 
+def test_luck_makes_as_much_of_calibrated_probabilities_as_is_said():
+    rng = np.random.default_rng(3)
+    told = rng.uniform(0.02, 0.98, (100, 400))
+    sets = [[{"inclusion": list(zip(row, rng.random(400) < row, strict=True))}] for row in told]
+    found = np.mean([score.calibration_error(cases) for cases in sets])
+    assert score.calibration_error(sets[0], by_luck=True) == pytest.approx(found, rel=0.05)
+
+
 def test_the_scorer_imports_nothing_but_json_and_numpy():
     tree = ast.parse(Path(score.__file__).read_text())
     names = {n.module if isinstance(n, ast.ImportFrom) else a.name for n in ast.walk(tree)

@@ -160,7 +160,7 @@ def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[s
     headers = {"figure": "left", "all": "right", "95 %": "left", "other form": "right", "permuted": "right"}
     names = ("cases", "failed", "identifiable_singles", "top1", "top3", "null_false_alarm", "pair_exact_set",
              "identifiable_pairs", "identifiable_pair_exact_set", "unknown_auroc_5_to_8",
-             "unknown_auroc_above_8", "unknown_tpr_at_5_fpr", "unknown_placed", "where_f1", "ece",
+             "unknown_auroc_above_8", "unknown_tpr_at_5_fpr", "unknown_placed", "where_f1", "ece", "ece_by_luck",
              "coverage95", "mean_set_size", "parameter_coverage95", "closure_median", "closure_p10", "oracle_fraction",
              "closure_effects_median", "closure_effects_p10", "oracle_fraction_effects", "closure_own_median",
              "closure_own_p10", "oracle_fraction_own", "closure_told_median", "seconds_per_case")  # fmt: skip
