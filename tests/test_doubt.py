@@ -21,6 +21,11 @@ from sim2real.posterior.sets import SetFit
 SOMETHING = UnknownFit("x_force", 0.0, (("1", 1.0, 0.1),), 0.0, {})
 
 
+def one(*names: str) -> SetFit:
+    """A set of effects that nobody flew."""
+    return SetFit(tuple(next(f for f in bank().families if f.effect.name == name) for name in names))
+
+
 def some(logs: list[float]) -> list[Hypothesis]:
     """No gap, and something unknown as often as there are further logs of evidence."""
     return [Hypothesis(SetFit(), None if k == 0 else SOMETHING, -1.0 - k, log) for k, log in enumerate(logs)]
@@ -45,28 +50,51 @@ def test_doubt_about_a_gap_is_for_other_explanations_of_it():
     assert after[-1].probability < 0.1 * DOUBT
 
 
+def told(*names: str, unknown: UnknownFit | None = None, log: float = 300.0, regained: float = 0.0) -> Hypothesis:
+    """An explanation, its prior as if nothing were known."""
+    return Hypothesis(one(*names) if names else SetFit(), unknown, -3.0, log, regained=regained)
+
+
 @given(st.floats(-10.0, 1e6), st.floats(0.0, 1e5))
 def test_doubt_grows_as_the_library_s_own_form_fails(regained, more):
-    assert DOUBT <= doubt(regained) <= doubt(regained + more) <= MOST_DOUBT
+    less, own = told("wing_ice", regained=regained), told("wing_ice", regained=regained + more)
+    assert DOUBT <= doubt(less) <= doubt(own) <= MOST_DOUBT
+
+
+def test_doubt_grows_with_the_causes_that_are_named():
+    single, pair, three = told("wing_ice"), told("roll_trim", "wing_ice"), told("cg_shift", "roll_trim", "wing_ice")
+    assert doubt(told(unknown=SOMETHING)) == doubt(single) < doubt(pair) < doubt(three)
+    assert doubt(told("wing_ice", unknown=SOMETHING)) == doubt(three)
+
+
+@pytest.mark.parametrize(("best", "parts"), [
+    (told("roll_trim", "wing_ice"), [told("roll_trim", log=40.0), told("wing_ice", log=20.0)]),
+    (told("wing_ice", unknown=SOMETHING), [told(unknown=SOMETHING, log=40.0), told("wing_ice", log=20.0)]),
+    (told("cg_shift", "roll_trim", "wing_ice"), [told("cg_shift", "roll_trim", log=40.0)]),
+])
+def test_what_is_doubted_of_several_causes_is_mostly_one_of_them(best, parts):
+    """Also parts that are less probable than what is kept of other sets, and however many rank before them."""
+    others = [told(name, log=200.0 - k) for k, name in enumerate(("alpha_bias", "alpha_scale", "fin_ice"))]
+    after = doubted(normalised([told(log=0.0), *parts, best, *others]))
+    found = {(h.effects, h.unknown is not None): h.probability for h in after}
+    assert after[0].effects == best.effects
+    assert found[parts[0].effects, parts[0].unknown is not None] > 0.3 * doubt(best)
+    assert sum(found[p.effects, p.unknown is not None] for p in parts) > 0.5 * doubt(best)
+    assert sum(found.values()) == pytest.approx(1.0)
 
 
 def test_what_another_form_explains_is_doubted_more():
     exact, bent = (doubted(normalised([Hypothesis(SetFit(), None, -1.0, 0.0),
                                        Hypothesis(SetFit(), SOMETHING, -2.0, 300.0 - r, regained=r),
                                        Hypothesis(SetFit(), SOMETHING, -3.0, 100.0)], 0.0)) for r in (0.0, 200.0))
-    assert exact[0].probability == pytest.approx(1.0 - doubt(0.0), abs=0.01)
-    assert bent[0].probability == pytest.approx(1.0 - doubt(200.0), abs=0.02)
+    assert exact[0].probability == pytest.approx(1.0 - doubt(exact[0]), abs=0.01)
+    assert bent[0].probability == pytest.approx(1.0 - doubt(bent[0]), abs=0.02)
 
 
 def test_no_gap_is_not_doubted():
     found = normalised(some([0.5, 0.0, 1.0]), 0.0)
     assert found[0].unknown is None
     assert [h.probability for h in doubted(found)] == [h.probability for h in found]
-
-
-def one(*names: str) -> SetFit:
-    """A set of effects that nobody flew."""
-    return SetFit(tuple(next(f for f in bank().families if f.effect.name == name) for name in names))
 
 
 @given(st.floats(-5.0, 4000.0), st.floats(0.0, 1.0))

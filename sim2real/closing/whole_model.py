@@ -35,7 +35,7 @@ from sim2real.records.reconstruct import Reconstruction
 ANOTHER = 2.0  # times the noise that the best explanation leaves (tempering), beyond which it is not all (assumed)
 STRETCHED = 1e-5  # chance of numbers as far from published ones as those that go with it, at which it is not all, too
 TAKEN = 0.5  # of the gap in free flight that it leaves: all numbers together leave at most that (assumed)
-SHARE = 0.9  # probability, at least, that it is they that differ where they do (assumed)
+SHARE = 0.6  # probability, at least, that it is they that differ where they do (assumed)
 SHOWN, PLAIN = 3.0, 2.0  # standard errors, and times its published spread, from which a number is told (assumed)
 SEEN = 0.25  # tolerances by which a component is changed, from which its numbers are told (assumed)
 HALF = 0.5  # s in which an angular acceleration makes the rate that is compared with the tolerance
