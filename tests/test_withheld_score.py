@@ -44,6 +44,20 @@ def write(folder: Path, pairs: list[tuple[dict, dict]], prefix: str = "c") -> tu
     return folder / "answers", folder / "keys"
 
 
+def test_singles_that_cannot_be_told_have_an_ideal_observer_beside(tmp_path):
+    """One stands 3.5 from none, half are told; one is as near to a rival, half are named; one in another form."""
+    alike = {n: 0.0 if n == NAMES[0] else 15.0 for n in NAMES}
+    pairs = [(answer([NAMES[0]]), key("single", [NAMES[0]], 0.0)),  # can be told
+             (answer([]), key("single", [NAMES[0]], 0.0, none=score.SAME)),
+             (answer([NAMES[1]]), key("single", [NAMES[0]], 0.5, D=alike | {NAMES[1]: 0.0})),
+             (answer([NAMES[0]]), key("single", [NAMES[0]], 1.5, D=dict.fromkeys(NAMES, 15.0) | {
+                 NAMES[0]: 3.0, NAMES[1]: 5.0}))]
+    found = score.score(*write(tmp_path, pairs))
+    assert found["identifiable_singles"] == 1 and found["elsewhere_top1"] == pytest.approx(1.0 / 3.0)
+    other = 0.9772  # of a normal deviate, below half of the root of 5^2 - 3^2
+    assert found["elsewhere_ideal"] == pytest.approx((0.5 + 0.5 + other) / 3.0, abs=1e-4)
+
+
 @pytest.fixture
 def perfect(tmp_path) -> tuple[Path, Path]:
     pairs = []
@@ -152,11 +166,12 @@ def test_luck_makes_as_much_of_calibrated_probabilities_as_is_said():
     assert score.calibration_error(sets[0], by_luck=True) == pytest.approx(found, rel=0.05)
 
 
-def test_the_scorer_imports_nothing_but_json_and_numpy():
+def test_the_scorer_imports_nothing_but_numpy_beside_what_python_has():
     tree = ast.parse(Path(score.__file__).read_text())
     names = {n.module if isinstance(n, ast.ImportFrom) else a.name for n in ast.walk(tree)
              if isinstance(n, ast.Import | ast.ImportFrom) for a in n.names}  # fmt: skip
-    assert names <= {"__future__", "json", "math", "re", "sys", "collections.abc", "pathlib", "typing", "numpy"}
+    assert names <= {"__future__", "json", "math", "re", "sys", "collections.abc", "pathlib", "statistics", "typing",
+                     "numpy"}
 
 
 def test_the_scorer_runs_where_it_lies(perfect):

@@ -158,12 +158,13 @@ def solve_by(case: Path, rival: str) -> dict[str, Any]:
 def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[str]]]]:
     """For people: the headline figures of all cases, of mismatched forms, and of answers dealt to the wrong cases."""
     headers = {"figure": "left", "all": "right", "95 %": "left", "other form": "right", "permuted": "right"}
-    names = ("cases", "failed", "identifiable_singles", "top1", "top3", "null_false_alarm", "pair_exact_set",
-             "identifiable_pairs", "identifiable_pair_exact_set", "unknown_auroc_5_to_8",
-             "unknown_auroc_above_8", "unknown_tpr_at_5_fpr", "unknown_placed", "where_f1", "ece", "ece_by_luck",
-             "coverage95", "mean_set_size", "parameter_coverage95", "closure_median", "closure_p10", "oracle_fraction",
-             "closure_effects_median", "closure_effects_p10", "oracle_fraction_effects", "closure_own_median",
-             "closure_own_p10", "oracle_fraction_own", "closure_told_median", "seconds_per_case")  # fmt: skip
+    names = ("cases", "failed", "identifiable_singles", "top1", "top3", "elsewhere_top1", "elsewhere_ideal",
+             "null_false_alarm", "pair_exact_set", "identifiable_pairs", "identifiable_pair_exact_set",
+             "unknown_auroc_5_to_8", "unknown_auroc_above_8", "unknown_tpr_at_5_fpr", "unknown_placed", "where_f1",
+             "ece", "ece_by_luck", "coverage95", "mean_set_size", "parameter_coverage95", "closure_median",
+             "closure_p10", "oracle_fraction", "closure_effects_median", "closure_effects_p10",
+             "oracle_fraction_effects", "closure_own_median", "closure_own_p10", "oracle_fraction_own",
+             "closure_told_median", "seconds_per_case")  # fmt: skip
 
     def text(value: Any) -> str:
         return "-" if value is None else f"{value}" if isinstance(value, int) else f"{value:.3f}"

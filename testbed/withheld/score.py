@@ -2,8 +2,8 @@
 
 `python score.py ANSWERS KEYS [REFLY [WITHOUT [RIVAL ...]]]`: folders of one JSON file a case. REFLY is what `refly.py`
 writes (without it closure is null, and the solver's own stands under `closure_told_median`), WITHOUT answers to single
-effects with the true effect left out of the library, RIVAL `answers_NAME` of another solver, a baseline. Bootstrap 95 %
-intervals are over cases. What counts as right is said in docs/benchmark_diagnosis.md.
+effects with the true effect left out of the library, RIVAL `answers_NAME` of another solver, a baseline. What counts as
+right is said in docs/benchmark_diagnosis.md.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 
 DETECTABLE, APART, SAME = 6.0, 5.0, 3.5  # D to none; D beyond which a rival is another; D within which it is not
-BINS, LOWEST, HIGHEST = 15, 0.02, 0.98
+BINS, LOWEST, HIGHEST, NORMAL = 15, 0.02, 0.98, NormalDist()
 HARMLESS = ("slow", "between", "engines", "powerless")  # what formats allow
 # Gap before, the least that is one (that of the spread, or of noise and gust), gap of the truth, gap of the answer: of
 # all that it changes in the published aircraft, of its effects alone, of these in the aircraft with its own spread.
@@ -41,9 +42,8 @@ def load(answers: Path, keys: Path, refly: Path | None = None) -> list[Case]:
         key = keys / path.name
         if not key.is_file():
             raise ValueError(f"{path.name}: no key of that name in {keys}")
-        again = None if refly is None else refly / path.name
-        flown = json.loads(again.read_text()) if again is not None and again.is_file() else None
-        found.append(flat(json.loads(path.read_text()), json.loads(key.read_text()), flown))
+        again = [json.loads(p.read_text()) for p in ([] if refly is None else [refly / path.name]) if p.is_file()]
+        found.append(flat(json.loads(path.read_text()), json.loads(key.read_text()), *again))
     if not found:
         raise ValueError(f"no answers in {answers}")
     return found
@@ -59,22 +59,22 @@ def flat(answer: dict[str, Any], key: dict[str, Any], flown: dict[str, Any] | No
     inclusion = {name: sum(h["probability"] for h in hypotheses if name in h["effects"])
                  for name in {n for h in hypotheses for n in h["effects"]}}  # fmt: skip
     told = [_label(answer["hypotheses"][i]) for i in answer.get("credible_set_95", [])]
-    closure = answer.get("gap", {}).get("held_out", {}).get("closure")
     return {
         "tier": key["tier"], "sigma": key["sigma_w"], "other": "other" in key["forms"], "truth": truth,
         "effects": tuple(key["effects"]), "failed": "error" in answer, "none": key["D_none"], "pair": key["D_pair"],
-        "identifiable": identifiable(key),
-        "top1": bool(listed) and (listed[0] == truth or _in_class(answer, listed[0], key)),
-        "exact": bool(listed) and listed[0] == truth, "top3": truth in listed[:3],
+        # By an ideal observer: half of those SAME from none, or as near to a rival as to their name (about).
+        "ideal": NORMAL.cdf(key["D_none"] - SAME) * NORMAL.cdf(math.sqrt(max(_apart(key), 0.0)) / 2.0),
+        "identifiable": identifiable(key), "exact": listed[:1] == [truth], "top3": truth in listed[:3],
+        "top1": listed[:1] == [truth] or (bool(listed) and _in_class(answer, listed[0], key)),
         "alarm": answer.get("verdict") != "no_gap", "silent": answer.get("verdict") == "no_gap",
         "told_unknown": (unknown := answer.get("verdict") == "unknown"), "near": near, "open": near or unknown,
         "placed": (answer.get("unknown") or {}).get("component") in key["where"],
         "p_unknown": sum(h["probability"] for h in hypotheses if h["unknown"]),
         "p_truth": sum(h["probability"] for h in hypotheses if _label(h) == truth),
         "inclusion": [(p, name in key["effects"]) for name, p in sorted(inclusion.items())],
-        "covered": truth in told, "size": len(told), "closure_told": closure, **_closures(key, flown),
+        "covered": truth in told, "size": len(told), "where": frozenset(key["where"]), **_closures(key, flown),
+        "closure_told": answer.get("gap", {}).get("held_out", {}).get("closure"),
         "seen": frozenset(c for c, p in answer.get("where", {}).get("components", {}).items() if p >= 0.5),
-        "where": frozenset(key["where"]),
         "interval": _interval(answer, key), "seconds": answer.get("seconds"), **_faulty(answer, key),
     }  # fmt: skip
 
@@ -113,16 +113,18 @@ def _label(hypothesis: dict[str, Any]) -> tuple[frozenset[str], bool]:
     return frozenset(hypothesis["effects"]), bool(hypothesis["unknown"])
 
 
-def identifiable(key: dict[str, Any]) -> bool:
-    """Whether an ideal observer could name one effect or a pair: it stands out, nearer to its name than to others.
-
-    Others are single effects, and all pairs where it is one. Keys of before 24 November 2026 do not tell of pairs.
-    """
-    own, rival = key.get("D_own_set") or 0.0, key.get("D_rival_set") or 0.0
+def _apart(key: dict[str, Any]) -> float:
+    """Whitened square by which an effect (a pair) is nearer to its name than to other effects (and pairs)."""
+    own, rival = key.get("D_own_set") or 0.0, key.get("D_rival_set") or 0.0  # not there before 24 November 2026
     if key["tier"] == "single":
         own = key["D"][key["effects"][0]]
         rival = min(d for name, d in key["D"].items() if name not in key["effects"])
-    return key["D_none"] >= DETECTABLE and bool(rival**2 - own**2 >= APART**2)
+    return float(rival**2 - own**2)
+
+
+def identifiable(key: dict[str, Any]) -> bool:
+    """Whether an ideal observer could name one effect or a pair: it stands out, nearer to its name than to others."""
+    return key["D_none"] >= DETECTABLE and _apart(key) >= APART**2
 
 
 def _in_class(answer: dict[str, Any], first: tuple[frozenset[str], bool], key: dict[str, Any]) -> bool:
@@ -150,17 +152,15 @@ def _interval(answer: dict[str, Any], key: dict[str, Any]) -> bool | None:
 
 def share(values: Sequence[Any]) -> float | None:
     """Mean of truth values; None of none."""
-    known = [float(v) for v in values if v is not None]
-    return float(np.mean(known)) if known else None
+    return float(np.mean(known)) if (known := [float(v) for v in values if v is not None]) else None
 
 
 def auroc(positive: Sequence[float], negative: Sequence[float]) -> float | None:
     """Probability that a positive scores above a negative, ties counted half."""
     if not positive or not negative:
         return None
-    p, n = np.asarray(positive)[:, None], np.sort(np.asarray(negative))
-    below, upto = np.searchsorted(n, p, "left"), np.searchsorted(n, p, "right")
-    return float(np.mean((below + upto) / 2.0) / len(n))
+    p, n = np.asarray(positive)[:, None], np.asarray(negative)
+    return float(np.mean((p > n) + 0.5 * (p == n)))
 
 
 def _unknown(cases: Sequence[Case], low: float, high: float) -> tuple[list[float], list[float]]:
@@ -193,40 +193,40 @@ def calibration_error(cases: Sequence[Case], by_luck: bool = False) -> float | N
 
 def f1(cases: Sequence[Case]) -> float | None:
     """Of components named with probability at least one half, over detectable single effects."""
-    chosen = [c for c in cases if c["tier"] == "single" and c["none"] >= DETECTABLE]
-    right = sum(len(c["seen"] & c["where"]) for c in chosen)
-    total = sum(len(c["seen"]) + len(c["where"]) for c in chosen)
-    return 2.0 * right / total if total else None
+    both = [(c["seen"], c["where"]) for c in cases if c["tier"] == "single" and c["none"] >= DETECTABLE]
+    total = sum(len(seen) + len(where) for seen, where in both)
+    return 2.0 * sum(len(seen & where) for seen, where in both) / total if total else None
 
 
 def figures(cases: Sequence[Case]) -> dict[str, Any]:
     """The figures of the interface for a set of cases; None where it holds none of the kind."""
     clear, pairs = ([c for c in cases if c["identifiable"] and c["tier"] == tier] for tier in ("single", "pair"))
-    beyond = _unknown(cases, APART, math.inf)
+    elsewhere = [c for c in cases if not c["identifiable"] and c["tier"] == "single"]
     closures = [c["closure_told"] for c in cases if c["tier"] in ("single", "pair") and c["closure_told"] is not None]
     return {
         "cases": len(cases), "failed": sum(c["failed"] for c in cases), "identifiable_singles": len(clear),
         "top1": share([c["top1"] for c in clear]), "top3": share([c["top3"] or c["top1"] for c in clear]),
         "top1_by_gust": {f"{s:g}": share([c["top1"] for c in clear if c["sigma"] == s]) for s in (0.0, 0.5, 1.5)},
+        **{f"elsewhere_{name}": share([c[name] for c in elsewhere]) for name in ("top1", "ideal")},
         "null_false_alarm": share([c["alarm"] for c in cases if c["tier"] == "null"]),
-        "pair_exact_set": share([c["exact"] for c in cases if c["tier"] == "pair"]),
-        "identifiable_pairs": len(pairs), "identifiable_pair_exact_set": share([c["exact"] for c in pairs]),
+        "pair_exact_set": share([c["exact"] for c in cases if c["tier"] == "pair"]), "identifiable_pairs": len(pairs),
         "unknown_auroc_5_to_8": auroc(*_unknown(cases, APART, 8.0)),
         "unknown_auroc_above_8": auroc(*_unknown(cases, 8.0, math.inf)),
         "unknown_placed": share([c["placed"] for c in cases if c["tier"] == "unknown" and c["told_unknown"]]),
-        "unknown_tpr_at_5_fpr": tpr_at(*beyond), "where_f1": f1(cases), "ece": calibration_error(cases),
-        "ece_by_luck": calibration_error(cases, by_luck=True), "coverage95": share([c["covered"] for c in cases]),
+        "unknown_tpr_at_5_fpr": tpr_at(*_unknown(cases, APART, math.inf)),
+        "where_f1": f1(cases), "ece": calibration_error(cases), "ece_by_luck": calibration_error(cases, by_luck=True),
+        "identifiable_pair_exact_set": share([c["exact"] for c in pairs]),
+        "coverage95": share([c["covered"] for c in cases]),
         "mean_set_size": share([c["size"] for c in cases if not c["failed"]]),
         "parameter_coverage95": share([c["interval"] for c in cases]),
         "log_score": float(np.mean([-math.log(max(c["p_truth"], 1e-6)) for c in cases])) if cases else None,
-        **_closed(cases, "published", ""), **_closed(cases, "effects_alone", "_effects"),
-        **_closed(cases, "own", "_own"),
+        **_closed(cases, "published"), **_closed(cases, "effects_alone", "_effects"), **_closed(cases, "own", "_own"),
         "closure_told_median": float(np.median(closures)) if closures else None,
         "seconds_per_case": share([c["seconds"] for c in cases]),
     }  # fmt: skip
 
 
-def _closed(cases: Sequence[Case], kind: str, suffix: str) -> dict[str, float | None]:
+def _closed(cases: Sequence[Case], kind: str, suffix: str = "") -> dict[str, float | None]:
     """Median and tenth percentile of the closure of singles and pairs, and the median over that of the truth."""
     found = np.array([c[kind] for c in cases if c[kind] is not None])
     names = (f"closure{suffix}_median", f"closure{suffix}_p10", f"oracle_fraction{suffix}")
@@ -260,8 +260,8 @@ def by_tier(cases: Sequence[Case], without: Sequence[Case]) -> dict[str, Any]:
     tiers = {tier: _shares(of[tier], rule) | {"detectable": sum(c["none"] >= DETECTABLE for c in of[tier])}
              for tier, rule in RIGHT.items()}  # fmt: skip
     clear = [c for c in cases if c["identifiable"] and c["tier"] == "single"]
-    names = sorted({c["effects"][0] for c in clear})
-    tiers["single"]["recall"] = {n: share([c["top1"] for c in clear if c["effects"] == (n,)]) for n in names}
+    tiers["single"]["recall"] = {n: share([c["top1"] for c in clear if c["effects"] == (n,)])
+                                 for n in sorted({c["effects"][0] for c in clear})}  # fmt: skip
     if of["faults"]:
         kinds = {k: [c["caught"] for c in of["faults"] if c["fault"] == k] for k in {c["fault"] for c in of["faults"]}}
         tiers["faults"] = _shares(of["faults"], "caught", "named", "failed", "blamed")
