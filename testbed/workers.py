@@ -1,8 +1,9 @@
-"""What worker processes start with: a core each, and memory that is kept."""
+"""What worker processes start with, a core each and memory that is kept; and how much memory a process has had."""
 
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -22,3 +23,13 @@ def a_core_each() -> Iterator[None]:
     finally:
         for name in mine:
             del os.environ[name]
+
+
+def peak_memory_gb() -> float | None:
+    """Most memory that this process has had so far [GB]; None where the system does not say (Windows)."""
+    if sys.platform == "win32":
+        return None
+    import resource
+
+    unit = 1.0 if sys.platform == "darwin" else 1024.0  # bytes there, KiB elsewhere
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e9

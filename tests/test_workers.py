@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import os
+import sys
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
+import numpy as np
+import pytest
+
 from icing_env.errors import InputError
 from testbed.benchmarks.answers import answered
-from testbed.workers import START, a_core_each
+from testbed.commands.diagnose import cost
+from testbed.workers import START, a_core_each, peak_memory_gb
 
 
 def told(name: str) -> str | None:
@@ -33,3 +38,10 @@ def test_a_case_that_fails_is_an_answer_and_costs_no_other_its_own():
 
 def refused(text: str) -> dict[str, object]:
     raise InputError(f"no number: {text}")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the system does not say")
+def test_memory_is_told_in_gigabytes():
+    held = np.ones(50_000_000)
+    assert held.nbytes / 1e9 <= peak_memory_gb() < 50.0
+    assert cost(27.3).startswith("Took 27 s and ") and cost(27.3).endswith(" GB of memory at most.")

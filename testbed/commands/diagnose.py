@@ -73,8 +73,17 @@ def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tu
     show(found, result)
     if policies:
         show_policies(result["policies"])
+    click.echo(cost(result["seconds"]))
     if out is not None:
         click.echo(f"report: {out / 'report.html'}")
+
+
+def cost(seconds: float) -> str:
+    """What a diagnosis took."""
+    from testbed.workers import peak_memory_gb
+
+    memory = peak_memory_gb()
+    return f"Took {seconds:.0f} s" + ("." if memory is None else f" and {memory:.1f} GB of memory at most.")
 
 
 def rank_policies(result: dict[str, Any], seed: int, say: Callable[[str], None]) -> dict[str, Any] | None:
