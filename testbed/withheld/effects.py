@@ -94,6 +94,12 @@ def _fin_other(s: float) -> Change:
             "CY_beta_soft": N["k_CY_beta_vtail"] * s * N["CY_beta"], "Cn_r": N["Cn_r"] * (1.0 - s)}, {}  # fmt: skip
 
 
+# What an effect adds as a share of another number goes with the aircraft's own: (effect, what it adds to): that number.
+PART_OF = {("asymmetric_ice", "Cl_alpha"): "CZ_alpha", ("asymmetric_ice", "Cn_0"): "CX_0",
+           ("asymmetric_ice", "CZ_alpha_right"): "CZ_alpha", ("asymmetric_ice", "CX_0_right"): "CX_0"}  # fmt: skip
+ADDED = {("pitch_trim", "Cm_0")}  # to a number that is not zero: as it is, whatever the aircraft's own is
+
+
 def _asymmetric_same(s: float) -> Change:
     half = 0.5 * N["lift_arm"] * s
     return {"Cl_alpha": half * N["k_CZ_alpha_wing"] * N["CZ_alpha"], "Cn_0": -half * N["k_CX_0_wing"] * N["CX_0"]}, {}

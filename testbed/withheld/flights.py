@@ -34,7 +34,10 @@ class Aircraft:
                 neutral = PUBLISHED.get(key, 0.0)
                 # several effects at once: factors multiply, knobs and constants add
                 if key in KNOBS or neutral == 0.0:
-                    row[key] += value - neutral
+                    own = self.baseline.get(effects.PART_OF.get((name, key), ""), 1.0)
+                    row[key] += (value - neutral) * own
+                elif (name, key) in effects.ADDED:
+                    row[key] += (value - neutral) / self.baseline.get(key, 1.0)
                 else:
                     row[key] *= value / neutral
         for key, factor in self.baseline.items():
