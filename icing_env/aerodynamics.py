@@ -54,20 +54,6 @@ AERODYNAMIC_PARAMETERS: list[Field] = [
     ("induced_drag", "1", "K of CD = CD_0 + K CL^2, for ground effect"),
     ("ground_lift", "1", "relative gain of lift at the ground"),
     ("ground_moment", "1", "moment at the ground (loss of downwash)"),
-    # what no derivative expresses: a description of something unknown (`discrepancy` below)
-    ("CX_elevator", "1/rad", "axial force per elevator"),
-    *((f"{c}_airspeed", "s/m", f"{c} per true airspeed") for c in ("CX", "CZ", "Cm", "CY", "Cl", "Cn")),
-    *((f"{c}_airspeed2", "s2/m2", f"{c} per square of true airspeed") for c in ("Cl", "Cm", "Cn")),
-    *((f"{c}_alpha2", "1/rad2", f"{c} per square of the angle of attack") for c in ("CZ", "Cm")),
-    ("Cm_elevator2", "1/rad2", "Cm per square of the elevator"),
-    ("Cm_alpha_elevator", "1/rad2", "Cm per angle of attack times elevator"),
-    *((f"{c}_alpha_beta", "1/rad2", f"{c} per angle of attack times sideslip") for c in ("CY", "Cl", "Cn")),
-    *((f"{c}_{of}3", "1/rad3", f"{c} per cube of {what}") for what, of, coefficients in (
-        ("the angle of attack", "alpha", ("CZ", "Cm")), ("the elevator", "elevator", ("Cm",)),
-        ("q c/2V", "q", ("Cm",)), ("the sideslip", "beta", ("CY", "Cl", "Cn")), ("p b/2V", "p", ("Cl",)),
-        ("r b/2V", "r", ("Cn",)), ("the ailerons", "aileron", ("Cl",)), ("the rudder", "rudder", ("Cn",)))
-      for c in coefficients),
-    *((f"{c}_time", "1/s", f"growth of {c} since the start") for c in ("CX", "CY", "CZ", "Cl", "Cm", "Cn")),
 ]
 
 CT_MAX = 1.0  # slipstream terms are frozen beyond it; static running would otherwise divide by zero airspeed
@@ -133,24 +119,3 @@ def lateral(alpha: float, beta: float, phat: float, rhat: float, share: float, x
     cn = (p.Cn_0 + c.Cn_beta*beta + c.Cn_p*phat + c.Cn_r*rhat
           + c.Cn_aileron*x.aileron + c.Cn_rudder*x.rudder)
     return cy, cl, cn
-
-
-@kernel
-def discrepancy(alpha: float, beta: float, phat: float, qhat: float, rhat: float, airspeed: float, x: Any, c: Any,
-                p: Any) -> tuple:
-    """CX, CY, CZ, Cl, Cm, Cn that a description of something unknown adds; exactly 0 with its numbers neutral.
-
-    Terms of a regression on residual coefficients (Klein & Morelli, Aircraft System Identification, section 5.4) that
-    are no derivatives of the model; `c.elapsed`: s since the start.
-    """
-    t, V, e, aileron, rudder = c.elapsed, airspeed, x.elevator, x.aileron, x.rudder
-    cx = p.CX_elevator*e + p.CX_airspeed*V + p.CX_time*t
-    cy = beta*(p.CY_alpha_beta*alpha + p.CY_beta3*beta*beta) + p.CY_airspeed*V + p.CY_time*t
-    cz = alpha*alpha*(p.CZ_alpha2 + p.CZ_alpha3*alpha) + p.CZ_airspeed*V + p.CZ_time*t
-    cl = beta*(p.Cl_alpha_beta*alpha + p.Cl_beta3*beta*beta) + p.Cl_p3*phat*phat*phat
-    cl += p.Cl_aileron3*aileron*aileron*aileron + V*(p.Cl_airspeed + p.Cl_airspeed2*V) + p.Cl_time*t
-    cm = alpha*(alpha*(p.Cm_alpha2 + p.Cm_alpha3*alpha) + p.Cm_alpha_elevator*e) + p.Cm_q3*qhat*qhat*qhat
-    cm += e*e*(p.Cm_elevator2 + p.Cm_elevator3*e) + V*(p.Cm_airspeed + p.Cm_airspeed2*V) + p.Cm_time*t
-    cn = beta*(p.Cn_alpha_beta*alpha + p.Cn_beta3*beta*beta) + p.Cn_r3*rhat*rhat*rhat
-    cn += p.Cn_rudder3*rudder*rudder*rudder + V*(p.Cn_airspeed + p.Cn_airspeed2*V) + p.Cn_time*t
-    return cx, cy, cz, cl, cm, cn

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from icing_env.configuration import Sourced, read_toml, validate
 from icing_env.errors import InputError, nearest
-from icing_env.parameters import GROUPS, PARAMETERS, UNITS
+from icing_env.parameters import GROUPS, PARAMETERS, UNITS, ZERO_UNLESS_GIVEN
 
 
 def load(
@@ -32,7 +32,8 @@ def load(
     numbers: dict[str, Sourced] = {}
     for kind, name in (("ice", ice), ("instruments", instruments), ("weather", weather), ("aircraft", aircraft)):
         numbers |= read_numbers(kind, name)
-    missing = sorted(set(UNITS) - set(numbers))
+    silent = {name for group in ZERO_UNLESS_GIVEN for name, _, _ in GROUPS[group]}
+    missing = sorted(set(UNITS) - silent - set(numbers))
     if missing:
         raise InputError(f"aircraft '{aircraft}': no value for {', '.join(missing[:5])}" + ", ..."*(len(missing) > 5))
     row = np.zeros(1, PARAMETERS)

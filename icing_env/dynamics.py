@@ -13,8 +13,9 @@ import math
 from typing import Any
 
 from icing_env.actuators import aileron_hinge_moment, elevator_hinge_moment, floated, surface_rate
-from icing_env.aerodynamics import CT_MAX, discrepancy, lateral, longitudinal, separation, smootherstep, tail_angle
+from icing_env.aerodynamics import CT_MAX, lateral, longitudinal, separation, smootherstep, tail_angle
 from icing_env.atmosphere import GAS_CONSTANT, gravity, place_of_static_air, static_air, static_air_near
+from icing_env.discrepancy import bent, discrepancy
 from icing_env.frames import angle_of, direction_cosines, to_body, to_local
 from icing_env.jit import block, kernel
 from icing_env.propulsion import power_available, thrust_per_power
@@ -122,9 +123,10 @@ def loads(x: Any, air: tuple, s: Any, c: Any, p: Any) -> tuple:
     cm -= tail*p.Cm_alpha_tail*(alpha_tail + c.alpha_tail_stall)
     cl += 0.5*p.lift_arm*(lift_right - lift_left)
     cn -= 0.5*p.lift_arm*(axial_right - axial_left)
-    more_x, more_y, more_z, more_l, more_m, more_n = discrepancy(alpha, beta, phat, qhat, rhat, airspeed, x, c, p)
-
     bluff = 0.5*density*airspeed*p.wing_area*c.CD_parasite
+    more_x, more_y, more_z, more_l, more_m, more_n = discrepancy(
+        alpha, beta, (phat, qhat, rhat), airspeed, ct, qs*cy - bluff*va, slowness, x, c, p)
+
     fx = qs*(0.5*(axial_left + axial_right) + rest_x + more_x) - bluff*ua + thrust
     fy = qs*(cy + more_y) - bluff*va
     fz = qs*(0.5*(lift_left + lift_right) + rest_z + more_z) - bluff*wa
@@ -160,21 +162,31 @@ def rigid_body(x: Any, attitude: tuple, dx: Any, fx: float, fy: float, fz: float
 
 
 @kernel
-def controls_and_engines(x: Any, dx: Any, u: Any, hinge_e: float, hinge_a: float, static: float, c: Any,
-                         p: Any) -> None:
-    """Rates of the surfaces, the flap and the shaft powers."""
-    dx.elevator = surface_rate(
-        x.elevator,
-        p.elevator_gearing*u.elevator + p.elevator_offset
-        + floated(hinge_e, p.hinge_elevator_hold, c.per_elevator_stiffness),
-        p.elevator_min, p.elevator_max, c.per_elevator_lag, p.elevator_rate)
-    dx.aileron = surface_rate(
-        x.aileron,
-        p.aileron_gearing*u.aileron + p.aileron_offset
-        + floated(hinge_a, p.hinge_aileron_hold, c.per_aileron_stiffness),
-        p.aileron_min, p.aileron_max, c.per_aileron_lag, p.aileron_rate)
-    dx.rudder = surface_rate(x.rudder, p.rudder_gearing*u.rudder + p.rudder_offset,
-                             p.rudder_min, p.rudder_max, c.per_rudder_lag, p.rudder_rate)
+def surfaces(x: Any, dx: Any, u: Any, air: tuple, hinge_e: float, hinge_a: float, c: Any, p: Any) -> None:
+    """Rates of the control surfaces; `air`: of `meet_air`."""
+    airspeed, alpha, beta = air[2], air[3], air[4]
+    pushed = p.elevator_of_airspeed*airspeed + p.elevator_of_alpha*alpha
+    pushed += p.elevator_of_aileron*x.aileron + p.elevator_of_rudder*x.rudder
+    told = bent(p.elevator_gearing*u.elevator + p.elevator_offset, x.elevator, p.elevator_cube, p.elevator_side,
+                p.elevator_magnitude, p.elevator_direction, pushed)
+    dx.elevator = surface_rate(x.elevator, told + floated(hinge_e, p.hinge_elevator_hold, c.per_elevator_stiffness),
+                               p.elevator_min, p.elevator_max, c.per_elevator_lag, p.elevator_rate)
+    pushed = p.aileron_of_airspeed*airspeed + p.aileron_of_p*x.p
+    pushed += p.aileron_of_elevator*x.elevator + p.aileron_of_rudder*x.rudder
+    told = bent(p.aileron_gearing*u.aileron + p.aileron_offset, x.aileron, p.aileron_cube, p.aileron_side,
+                p.aileron_magnitude, p.aileron_direction, pushed)
+    dx.aileron = surface_rate(x.aileron, told + floated(hinge_a, p.hinge_aileron_hold, c.per_aileron_stiffness),
+                              p.aileron_min, p.aileron_max, c.per_aileron_lag, p.aileron_rate)
+    pushed = p.rudder_of_airspeed*airspeed + p.rudder_of_beta*beta
+    pushed += p.rudder_of_elevator*x.elevator + p.rudder_of_aileron*x.aileron
+    told = bent(p.rudder_gearing*u.rudder + p.rudder_offset, x.rudder, p.rudder_cube, p.rudder_side,
+                p.rudder_magnitude, p.rudder_direction, pushed)
+    dx.rudder = surface_rate(x.rudder, told, p.rudder_min, p.rudder_max, c.per_rudder_lag, p.rudder_rate)
+
+
+@kernel
+def flap_and_engines(x: Any, dx: Any, u: Any, static: float, c: Any, p: Any) -> None:
+    """Rates of the flap and the shaft powers."""
     dx.flap = surface_rate(x.flap, u.flap, 0.0, p.flap_max, PER_FLAP_LAG, p.flap_rate)
     full = power_available(static, p)
     dx.power_left = (full*min(max(u.throttle_left, 0.0), 1.0) - x.power_left)*c.per_spool_time
@@ -194,5 +206,6 @@ def rates(x: Any, dx: Any, attitude: tuple, air: tuple, s: Any, c: Any, p: Any, 
     (fx, fy, fz, roll, pitch, yaw, airspeed, alpha, _beta, _density, _left, _right,
      hinge_e, hinge_a, static) = loads(x, air, s, c, p)
     rigid_body(x, attitude, dx, fx, fy, fz, roll, pitch, yaw, c, p)
-    controls_and_engines(x, dx, u, hinge_e, hinge_a, static, c, p)
+    surfaces(x, dx, u, air, hinge_e, hinge_a, c, p)
+    flap_and_engines(x, dx, u, static, c, p)
     dx.alpha_downwash = (alpha - x.alpha_downwash)*max(airspeed, AIRSPEED_FLOOR)*c.per_tail_arm

@@ -12,6 +12,8 @@ from icing_env.accretion import ACCRETION_PARAMETERS
 from icing_env.actuators import ACTUATOR_PARAMETERS
 from icing_env.aerodynamics import AERODYNAMIC_PARAMETERS
 from icing_env.cloud import CLOUD_PARAMETERS
+from icing_env.crosstalk import CROSSTALK_PARAMETERS
+from icing_env.discrepancy import DISCREPANCY_PARAMETERS
 from icing_env.ice_protection import PROTECTION_PARAMETERS
 from icing_env.propulsion import PROPULSION_PARAMETERS
 from icing_env.sensors import SENSOR_PARAMETERS
@@ -39,6 +41,7 @@ EARTH_PARAMETERS: list[Field] = [
 GROUPS: dict[str, list[Field]] = {
     "mass": MASS_PARAMETERS,
     "aerodynamics": AERODYNAMIC_PARAMETERS,
+    "discrepancy": DISCREPANCY_PARAMETERS,
     "propulsion": PROPULSION_PARAMETERS,
     "actuators": ACTUATOR_PARAMETERS,
     "earth": EARTH_PARAMETERS,
@@ -48,10 +51,12 @@ GROUPS: dict[str, list[Field]] = {
     "accretion": ACCRETION_PARAMETERS,
     "ice_protection": PROTECTION_PARAMETERS,
     "sensors": SENSOR_PARAMETERS,
+    "crosstalk": CROSSTALK_PARAMETERS,
     "turbulence": TURBULENCE_PARAMETERS,
 }
 # What the equations of motion read comes first: `icing_env.blocks` takes no more than that.
-IN_MOTION = ("mass", "aerodynamics", "propulsion", "actuators", "earth", "wind", "cloud")
+IN_MOTION = ("mass", "aerodynamics", "discrepancy", "propulsion", "actuators", "earth", "wind", "cloud")
+ZERO_UNLESS_GIVEN = ("discrepancy", "crosstalk")  # what no file has to say
 N_IN_MOTION = sum(len(GROUPS[group]) for group in IN_MOTION)
 PARAMETER_FIELDS: list[Field] = [field for group in GROUPS.values() for field in group]
 PARAMETERS = structured(PARAMETER_FIELDS)

@@ -7,7 +7,8 @@ moments). The boom oscillates at 7 Hz and a 10 Hz low pass is applied in flight 
 every fast channel alike, controls included, so that filtering shifts none against another. Flow angles and
 accelerations are corrected to the c.g., as in the records.
 
-measured = (1 + scale) x (truth behind lag, boom and filter - delay x its rate) + bias + drift x time + noise
+measured = (1 + scale) x (truth behind lag, boom and filter - delay x its rate) + bias + drift x time + noise, and
+what `icing_env.crosstalk` adds.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import math
 from typing import Any
 
 from icing_env.atmosphere import pressure_altitude
+from icing_env.crosstalk import crosstalk, gyro_crosstalk
 from icing_env.frames import direction_cosines, euler_angles, to_local
 from icing_env.jit import kernel
 from icing_env.propulsion import torque
@@ -135,6 +137,7 @@ def read_quietly(s: Any, m: Any, p: Any) -> None:
     m.ay = (1.0 + p.scale_ay)*s.filtered_ay + p.bias_ay + p.drift_ay*t
     m.az = (1.0 + p.scale_az)*s.filtered_az + p.bias_az + p.drift_az*t
     m.rudder = s.filtered_rudder + p.bias_rudder
+    crosstalk(s, m, p)
 
 
 @kernel
@@ -147,6 +150,7 @@ def read_gyros_quietly(x: Any, m: Any, p: Any, phi: float, theta: float) -> None
     theta_rate = (attitude[8]*x.q - attitude[5]*x.r)/math.sqrt(plane)
     m.phi = (1.0 + p.scale_phi)*(phi - p.delay_phi*phi_rate) + p.bias_phi + p.drift_phi*m.time
     m.theta = (1.0 + p.scale_theta)*(theta - p.delay_theta*theta_rate) + p.bias_theta + p.drift_theta*m.time
+    gyro_crosstalk(m, p, phi, theta)
 
 
 @kernel

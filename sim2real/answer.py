@@ -17,6 +17,7 @@ from sim2real.over_time.history import SAME, History
 from sim2real.posterior.form import at_home
 from sim2real.posterior.hypotheses import P_NONE, P_UNKNOWN, Hypothesis, Posterior
 from sim2real.posterior.singles import EffectFit
+from sim2real.posterior.widened import interval
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.rollout import difference
 from sim2real.signatures.evidence import Evidence
@@ -54,8 +55,8 @@ def describe(name: str, posterior: Posterior, explained: Hypothesis | None = Non
     effect, parameter = fit.families[at].effect, fit.families[at].parameter
     shown = {p.name: {"estimate": p.neutral, "low95": p.neutral, "high95": p.neutral, "unit": p.unit}
              for p in effect.parameters}
-    shown[parameter.name] = {"estimate": fit.estimate[at], "low95": fit.low95[at], "high95": fit.high95[at],
-                             "unit": parameter.unit}
+    low, high = interval(fit.estimate[at], fit.low95[at], fit.high95[at], parameter.low, parameter.high)
+    shown[parameter.name] = {"estimate": fit.estimate[at], "low95": low, "high95": high, "unit": parameter.unit}
     return {"name": name, "probability": posterior.effects[name], "enters_at": list(effect.enters_at),
             "parameters": shown, "indistinguishable_from": list(posterior.classes[name]), **course.answer(),
             "other_form": form.answer() if form and explained and name in explained.effects

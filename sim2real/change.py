@@ -9,7 +9,7 @@ from sim2real.answer import judge
 from sim2real.baseline.references import Baseline
 from sim2real.closing import gap
 from sim2real.closing.discrepancy import Description, describe_unknown, described, in_other_form
-from sim2real.closing.own_numbers import with_own_numbers
+from sim2real.closing.own_numbers import of_component, with_own_numbers
 from sim2real.closing.remedy import Remedy, leading, remedy
 from sim2real.closing.whole_model import WholeModel, fit_whole_model, incomplete, takes_most, with_whole_model
 from sim2real.library.candidates import Bank
@@ -78,20 +78,24 @@ def changed(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
     alone, sigmas = remedy(told.explained, told.flown), [e.sigma_w for e in evidences]
     progress("flying the records freely, before and after")
     left = flown_freely(flights, sigmas, alone, seed)
+    change = with_own_numbers(alone, told.explained, told.flown, candidates.nuisances)
+    training = left if change is alone else replace(left, after=gap.of_all(flights, change, change.paths))
+    judged = left
+    if told.flown is not None and change is not alone:  # terms there were fitted beside the numbers of their component
+        at_home = of_component(change, told.flown.component)
+        judged = replace(left, after=gap.of_all(flights, at_home, at_home.paths))
     all_of_it = (told.flown is None or bool(told.flown.values)) and not posterior.best.varies
-    if any_aircraft and incomplete(posterior, left, all_of_it):
+    if any_aircraft and incomplete(posterior, judged, all_of_it):
         progress("fitting all numbers of the model, since what was found is not all")
         whole = fit_whole_model(flights, candidates, posterior)
-        change = whole.remedy()
-        closer = flown_freely(flights, sigmas, change, seed)
-        if takes_most(left, closer):
+        everything = whole.remedy()
+        closer = flown_freely(flights, sigmas, everything, seed)
+        if takes_most(judged, closer):
             posterior = with_whole_model(posterior, whole)
             told = Told(leading(judge(posterior)[0], posterior), told.unknown, None)
             alone = remedy(told.explained, None)
-            left = replace(closer, after=gap.of_all(flights, alone, change.paths))
-            return Changed(posterior, told, whole, alone, left, change, closer)
-    change = with_own_numbers(alone, told.explained, told.flown, candidates.nuisances)
-    training = left if change is alone else replace(left, after=gap.of_all(flights, change, change.paths))
+            left = replace(closer, after=gap.of_all(flights, alone, everything.paths))
+            return Changed(posterior, told, whole, alone, left, everything, closer)
     return Changed(posterior, told, None, alone, left, change, training)
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from second_discrepancy import NAMES, bent, discrepancy
 
 CONFIGS = Path(__file__).resolve().parents[1] / "configs"
 FILES = {"aircraft": "twin_otter", "instruments": "nasa_2002", "weather": "clear", "ice": "dhc6"}
@@ -45,7 +46,7 @@ def read(folder: str, name: str) -> dict[str, float]:
 
 def parameters(**files: str) -> dict[str, float]:
     """The union of one file from each folder (`aircraft="twin_otter_flight"` and so on)."""
-    numbers: dict[str, float] = {}
+    numbers = dict.fromkeys(NAMES, 0.0)
     for folder, name in (FILES | files).items():
         numbers |= read(folder, name)
     return numbers
@@ -175,19 +176,15 @@ def longitudinal(x: Record, a: Record, f: Record, h: Record, ct: Any, c: Record,
     flap_lift = (1 - f.share) * p.CL_flap * x.flap
     flap_drag = p.CD_flap * x.flap + p.induced_drag * flap_lift * (flap_lift - 2 * Z_wing)
     CX = (h.X_left + h.X_right) / 2 + flap_lift * a.sin_a - flap_drag * a.cos_a + low * p.induced_drag * Z_wing**2
-    CX += p.CX_elevator * x.elevator + p.CX_airspeed * a.V + p.CX_time * c.elapsed
     CZ = (Z_wing - flap_lift * a.cos_a - flap_drag * a.sin_a
           + c.CZ_q * a.qhat + c.CZ_elevator * x.elevator + p.CZ_CT * ct + low * p.ground_lift * Z_wing)  # fmt: skip
-    CZ += p.CZ_alpha2 * a.alpha**2 + p.CZ_alpha3 * a.alpha**3 + p.CZ_airspeed * a.V + p.CZ_time * c.elapsed
     Cm = (c.Cm_0 + c.Cm_alpha * ((1 - f.share) * a.alpha + f.share * p.Cm_alpha_separated * a.sin_a)
           + (c.Cm_q - p.Cm_alphadot) * a.qhat + p.Cm_alpha_tail * f.arrival
           + p.Cm_alphadot * (p.chord / (2 * p.tail_arm)) * (a.alpha - x.alpha_downwash)
           + c.Cm_elevator * x.elevator * (1 + p.Cm_elevator_CT * ct) * (1 - p.tail_stall_elevator_loss * f.tail)
           + p.Cm_flap * x.flap + p.Cm_CT * ct + low * p.ground_moment
           - f.tail * p.Cm_alpha_tail * (f.alpha_tail + c.alpha_tail_stall))  # fmt: skip
-    Cm += p.Cm_alpha2 * a.alpha**2 + p.Cm_alpha3 * a.alpha**3 + p.Cm_alpha_elevator * a.alpha * x.elevator
-    Cm += p.Cm_elevator2 * x.elevator**2 + p.Cm_elevator3 * x.elevator**3 + p.Cm_q3 * a.qhat**3
-    return CX, CZ, Cm + p.Cm_airspeed * a.V + p.Cm_airspeed2 * a.V**2 + p.Cm_time * c.elapsed
+    return CX, CZ, Cm
 
 
 def lateral(x: Record, a: Record, f: Record, h: Record, c: Record, p: Record) -> tuple[Any, Any, Any]:
@@ -198,11 +195,7 @@ def lateral(x: Record, a: Record, f: Record, h: Record, c: Record, p: Record) ->
           + loss * (c.Cl_p * a.phat + c.Cl_aileron * x.aileron) + p.lift_arm * (h.Z_right - h.Z_left) / 2)  # fmt: skip
     Cn = (p.Cn_0 + c.Cn_beta * a.beta + c.Cn_p * a.phat + c.Cn_r * a.rhat + c.Cn_aileron * x.aileron
           + c.Cn_rudder * x.rudder - p.lift_arm * (h.X_right - h.X_left) / 2)  # fmt: skip
-    ab, b3, V, t = a.alpha * a.beta, a.beta**3, a.V, c.elapsed
-    CY += p.CY_beta3 * b3 + p.CY_alpha_beta * ab + p.CY_airspeed * V + p.CY_time * t
-    Cl += p.Cl_beta3 * b3 + p.Cl_p3 * a.phat**3 + p.Cl_aileron3 * x.aileron**3 + p.Cl_alpha_beta * ab + p.Cl_time * t
-    Cn += p.Cn_beta3 * b3 + p.Cn_r3 * a.rhat**3 + p.Cn_rudder3 * x.rudder**3 + p.Cn_alpha_beta * ab + p.Cn_time * t
-    return CY, Cl + (p.Cl_airspeed + p.Cl_airspeed2 * V) * V, Cn + (p.Cn_airspeed + p.Cn_airspeed2 * V) * V
+    return CY, Cl, Cn
 
 
 # ---- sections 10 to 13
@@ -214,6 +207,8 @@ def loads(x: Record, a: Record, f: Record, t: Record, c: Record, p: Record) -> t
     CX, CZ, Cm = longitudinal(x, a, f, h, t.ct, c, p)
     CY, Cl, Cn = lateral(x, a, f, h, c, p)
     qS, bluff = a.qbar * p.wing_area, a.density * a.V * p.wing_area * c.CD_parasite / 2
+    more = discrepancy(x, a, t.ct, qS * CY - bluff * a.va, c, p)
+    CX, CY, CZ, Cl, Cm, Cn = (C + more[n] for n, C in zip(more, (CX, CY, CZ, Cl, Cm, Cn), strict=True))
     Fx, Fy, Fz = qS * CX - bluff * a.ua + t.both, qS * CY - bluff * a.va, qS * CZ - bluff * a.wa
     dx, dy, dz = p.cg_shift_x, p.cg_shift_y, p.cg_shift_z
     L = qS * p.span * Cl - dy * Fz + dz * Fy
@@ -256,11 +251,11 @@ def actuators(x: Record, a: Record, f: Record, p: Record, u: Record) -> list[Any
                    + p.hinge_elevator_stall * f.tail) * a.qbar * p.hinge_elevator_volume  # fmt: skip
     on_aileron = p.hinge_aileron_delta * x.aileron + p.hinge_aileron_stall * (f.left - f.right)
     on_aileron *= a.qbar * p.hinge_aileron_volume
-    elevator = (p.elevator_gearing * u.elevator + p.elevator_offset
+    elevator = (bent("elevator", p.elevator_gearing * u.elevator + p.elevator_offset, x, a, p)
                 + floated(on_elevator, p.hinge_elevator_hold, p.hinge_elevator_stiffness))  # fmt: skip
-    aileron = (p.aileron_gearing * u.aileron + p.aileron_offset
+    aileron = (bent("aileron", p.aileron_gearing * u.aileron + p.aileron_offset, x, a, p)
                + floated(on_aileron, p.hinge_aileron_hold, p.hinge_aileron_stiffness))  # fmt: skip
-    rudder = p.rudder_gearing * u.rudder + p.rudder_offset
+    rudder = bent("rudder", p.rudder_gearing * u.rudder + p.rudder_offset, x, a, p)
     loss = 1 - a.pressure / P0
     full = p.power_rated * (1 - loss * (p.power_lapse + p.power_lapse2 * loss))
     return [

@@ -18,7 +18,7 @@ from sim2real.flown.points import Flying
 from sim2real.flown.steps import FARTHEST, bounded_step
 from sim2real.library.bends import bends, changes
 from sim2real.library.candidates import bank
-from sim2real.library.terms import BEYOND, GENERIC, GENERIC_SIZE, Term, _values, in_common, pushes
+from sim2real.library.terms import BEYOND, GENERIC, GENERIC_SIZE, Term, in_common, pushes, values_of
 from sim2real.posterior.generic import fit_unknown
 from sim2real.posterior.home_terms import gain
 from sim2real.posterior.sets import SetFit
@@ -168,7 +168,7 @@ def test_a_rate_of_the_flow_is_that_of_its_angle(flights):
     time = flight.time - flight.time[0]
     measured = flight.measured.copy()
     measured[:, MEASURED.index("alpha")] = 0.02 * time
-    steady = _values(replace(flight, measured=measured), "alpha_dot")
+    steady = values_of(replace(flight, measured=measured), "alpha_dot")
     assert steady[round(1.0 / flight.dt) :] == pytest.approx(0.02, rel=1e-3)
 
 

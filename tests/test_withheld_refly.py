@@ -80,7 +80,9 @@ def test_terms_about_a_condition_are_those_of_the_library():
     values = {"CX_alpha_alpha": 0.4, "CZ_alpha": 0.3, "CZ_0": 0.01, "Cm_elevator": -0.1, "CY_r": 0.2, "Cl_0": 1e-3,
               "Cm_alpha_elevator": 0.5, "Cn_alpha_beta": 0.2, "Cl_airspeed": 1e-4, "Cl_airspeed_airspeed": 1e-6,
               "Cm_elevator_elevator_elevator": -3.0, "Cl_p_p_p": 0.2, "CZ_alpha_alpha_alpha": 5.0,
-              "CZ_time": 1e-3, "at_alpha": 0.05, "at_elevator": -0.02, "at_airspeed": 65.0, "at_time": 20.0,
+              "CZ_time": 1e-3, "Cn_alpha_CT": 0.3, "Cm_CT": 0.1, "Cl_q": 0.2, "CX_rudder_rudder": 0.5,
+              "Cm_alphadot": -2.0, "CZ_alpha_q": 3.0, "Cn_alpha_aileron": 0.2, "at_CT": 0.02, "at_alpha": 0.05,
+              "at_elevator": -0.02, "at_airspeed": 65.0, "at_time": 20.0,
               "bias_alpha": 0.01, "scale_alpha": 0.1, "scale_airspeed": 0.02}  # fmt: skip
     terms, lacking = refly.numbers(values)
     before, after = load(), with_effects(load(), {"discrepancy": values})

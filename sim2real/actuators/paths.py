@@ -17,10 +17,11 @@ from scipy.ndimage import maximum_filter1d
 from scipy.signal import lfilter
 
 from icing_env.atmosphere import pressure
+from icing_env.discrepancy import bends, bent
 from icing_env.jit import entry
 from icing_env.propulsion import power_available
 from icing_env.record import FloatArray
-from sim2real.library.terms import Term, path_courses
+from sim2real.library.terms import Term, path_courses, values_of
 from sim2real.records.channels import SURFACES
 from sim2real.records.instruments import UNFILTERED
 from sim2real.records.noise import white
@@ -45,7 +46,7 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
     """
     out = []
     for surface in (s for s in SURFACES if moves(flight, s)):
-        rows = _differing(parameters, [f"{surface}_{quantity}" for quantity in ACTUATOR])
+        rows = _differing(parameters, [*(f"{surface}_{quantity}" for quantity in ACTUATOR), *bends(surface)])
         predicted = answered(flight, surface, parameters[rows])
         own = [term for term in terms if term.component == f"{surface}_path"]
         courses = path_courses(flight, predicted[:, 0], [term.name for term in own])
@@ -72,7 +73,7 @@ def answered(flight: Reconstruction, surface: str, parameters: NDArray) -> Float
     """Position [N, rows] of a surface behind its recorded command, from where it was recorded first."""
     measured = flight.positions[surface]
     start = float(measured[np.isfinite(measured)][0])
-    return follow(flight.commands[f"{surface}_command"], start, parameters, surface, flight.dt)
+    return follow(flight.commands[f"{surface}_command"], start, parameters, surface, flight.dt, flight)
 
 
 def moves(flight: Reconstruction, surface: str) -> bool:
@@ -174,29 +175,40 @@ def _differing(parameters: NDArray, names: list[str]) -> list[int]:
     return [0, *(int(i) for i in np.flatnonzero(moved))]
 
 
-def follow(command: FloatArray, start: float, p: NDArray, surface: str, dt: float) -> FloatArray:
+def follow(command: FloatArray, start: float, p: NDArray, surface: str, dt: float,
+           along: Reconstruction | None = None) -> FloatArray:  # fmt: skip
     """Position [N, rows] of a surface behind its actuator and the recording's low pass.
 
     The command of sample k acts during the step that ends there.
+
+    Args:
+        along: the record, whose airspeed, load and other surfaces may push this one; nothing does if omitted.
     """
     cut = 1.0 - np.exp(-2.0 * np.pi * p["filter_frequency"] * dt)
     share = 1.0 - np.exp(-dt / np.maximum(p[f"{surface}_lag"], 1e-3))
-    gear, offset, low, high, rate = (
-        np.ascontiguousarray(p[f"{surface}_{name}"]) for name in ("gearing", "offset", "min", "max", "rate"))
+    pushed = np.zeros((len(command), len(p)))
+    if along is not None:
+        for name in (n for n in bends(surface) if "_of_" in n and np.any(p[n])):
+            pushed += values_of(along, name.rpartition("_")[2])[:, None] * p[name]
+    gear, offset, cube, side, magnitude, direction, low, high, rate = (np.ascontiguousarray(p[f"{surface}_{name}"]) for
+        name in ("gearing", "offset", "cube", "side", "magnitude", "direction", "min", "max", "rate"))  # fmt: skip
     out = np.empty((len(command), len(p)))
-    _follow(command, start, gear, offset, low, high, rate * dt, share, cut, out)
+    _follow(command, start, gear, offset, cube, side, magnitude, direction, low, high, rate * dt, share, cut, pushed,
+            out)  # fmt: skip
     return out
 
 
 @entry
-def _follow(command: Any, start: float, gear: Any, offset: Any, low: Any, high: Any, step: Any, share: Any, cut: Any,
-            out: Any) -> None:
-    """First-order lag with a limited step, then the low pass, for every row; `out`: [N, rows]."""
+def _follow(command: Any, start: float, gear: Any, offset: Any, cube: Any, side: Any, magnitude: Any, direction: Any,
+            low: Any, high: Any, step: Any, share: Any, cut: Any, pushed: Any, out: Any) -> None:
+    """First-order lag with a limited step, then the low pass, for every row; `pushed`, `out`: [N, rows]."""
     for i in range(out.shape[1]):
         position = filtered = start
         out[0, i] = start
         for k in range(1, len(command)):
-            target = min(max(gear[i]*command[k] + offset[i], low[i]), high[i])
+            told = bent(gear[i]*command[k] + offset[i], position, cube[i], side[i], magnitude[i], direction[i],
+                        pushed[k, i])
+            target = min(max(told, low[i]), high[i])
             position += min(max((target - position)*share[i], -step[i]), step[i])
             filtered += cut[i]*(position - filtered)
             out[k, i] = filtered
@@ -222,7 +234,7 @@ def driven(flight: Reconstruction, parameters: NDArray, paths: Collection[str]) 
         command = flight.commands.get(f"{surface}_command")
         if command is not None and np.ptp(command) > STILL_COMMAND:
             first = float(flight.controls[surface][0])
-            controls[surface] = follow(command, first, unrecorded, surface, flight.dt)[:, 0]
+            controls[surface] = follow(command, first, unrecorded, surface, flight.dt, flight)[:, 0]
     return replace(flight, controls=controls)
 
 

@@ -4,7 +4,8 @@ The generic terms of the component that a diagnosis points to are flown by the p
 dynamic pressure, inertia and instruments act on them as on any effect; nuisances give way. Terms are chosen forward and
 backward (modified stepwise regression, Klein & Morelli, Aircraft System Identification, AIAA 2006, section 5.4) by
 predicted squared error. In whitened units the noise is 1, and one term costs SHOWN^2: it earns its place where it alone
-would count as shown.
+would count as shown. Derivatives of the model are uncertain beside the terms as they are anywhere, at the component
+too: what another aircraft's own numbers make of a record would else be told as whichever terms are like it.
 """
 
 from __future__ import annotations
@@ -19,37 +20,28 @@ from numpy.typing import NDArray
 from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.baseline.references import Baseline
+from sim2real.closing.flyable import Choice, choices, condition, flyable
 from sim2real.flown.settling import nearer
-from sim2real.library.bends import COMPONENTS
 from sim2real.library.candidates import Bank, Nuisance, shifted
-from sim2real.library.terms import DEVIATION, FROM_ZERO, GENERIC, GENERIC_SIZE, PURE_DELAY
+from sim2real.library.terms import PURE_DELAY
 from sim2real.library.units import unit_of
 from sim2real.posterior.attribution import nuisance_mean, reduce, with_prior
 from sim2real.posterior.form import WORTH
-from sim2real.posterior.generic import COURSE
+from sim2real.posterior.generic import COURSE, UnknownFit
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
 from sim2real.posterior.sets import SetFit
 from sim2real.posterior.singles import DETECTABLE
-from sim2real.records.channels import SURFACES, TOLERANCE
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.evidence import Evidence, compare
 
 SHOWN = DETECTABLE  # standard errors that a term has to stand out
-ROUNDS, SETTLED = 8, 0.5  # of fitting at most, each flying the aircraft described so far; whitened square worth one
+ROUNDS, SETTLED = 12, 0.5  # of fitting at most, each flying the aircraft described so far; whitened square worth one
+# Units of a term by which its slope is taken at first; then as many as stand out so far: the curvature of a larger step
+# looks like what nuisances cannot do, that of a smaller one like rounding.
+AT_FIRST, STANDS_OUT, LEAST = 0.1, 20.0, 1e-3
+MORE = 3  # terms beside those of the round before: what a large gap is not linear in would be told as more of them
 RIDGE = 0.1  # prior precision of a term in its own unit (assumed: a standard deviation of three)
 LATE = ("_dot", "acceleration", PURE_DELAY, "slow_phi", "slow_theta", "slow_ax", "slow_ay")  # terms with a memory
-SCALE, DELAY = 0.1, 0.1  # unit of a channel's scale error, and s of its delay
-COEFFICIENT = {component: coefficient for coefficient, component in COMPONENTS.items()}
-ABOUT = ("alpha", "elevator", "airspeed")  # quantities whose deviations from the records' medians are terms
-
-
-@dataclass(frozen=True)
-class Choice:
-    """One term: its name among the generic ones, its number of the effect, and what counts as one unit of it."""
-
-    term: str
-    number: str
-    size: float
 
 
 @dataclass(frozen=True)
@@ -61,7 +53,7 @@ class Description:
         terms: (name, size, standard error) of those that earned their place, the surest first.
         values: of the effect `discrepancy`.
         covariance: of the sizes of `terms`.
-        nuisances: where the model's own numbers settled beside them [n], none at the component; None if not flown.
+        nuisances: where the model's own numbers settled beside them [n]; None if not flown.
     """
 
     component: str
@@ -80,48 +72,6 @@ class Description:
         """As the interface has it."""
         return {"component": self.component, "kind": self.kind,
                 "terms": [{"term": name, "coefficient": size, "std_error": error} for name, size, error in self.terms]}
-
-
-def choices(component: str, flights: Sequence[Reconstruction]) -> list[Choice]:
-    """The generic terms of a component as numbers of the effect, each with its unit."""
-    names = next(terms for where, _, terms in GENERIC if where == component)
-    half = 0.5 * _mean([f.time[-1] for f in flights])
-    if component.startswith("sensor:"):
-        channel = component.removeprefix("sensor:")
-        units = {"1": ("bias", TOLERANCE[channel]), channel: ("scale", SCALE), f"{channel}_dot": ("delay", DELAY),
-                 "time": ("drift", TOLERANCE[channel] / half)}  # fmt: skip
-        return [Choice(name, f"{units[name][0]}_{channel}", units[name][1]) for name in names]
-    p = flights[0].parameters[0]
-    slow = 2.0 * _mean([float(np.median(f.channel("airspeed"))) for f in flights])
-    per_rate = {"p": slow / p["span"], "q": slow / p["chord"], "r": slow / p["span"], "time": 1.0 / half}
-    target = next(target for where, target, _ in GENERIC if where == component)
-    out = []
-    for name in names:
-        size = GENERIC_SIZE[target]
-        for factor in name.split("*"):
-            size *= per_rate.get(factor, 1.0) / DEVIATION.get(factor, 1.0)
-        number = f"{COEFFICIENT[component]}_{'0' if name == '1' else name.replace('*', '_')}"
-        out.append(Choice(name, number, float(size)))
-    return out
-
-
-def condition(component: str, flights: Sequence[Reconstruction]) -> dict[str, float]:
-    """The condition that deviations are counted from: medians of the records, the middle of their time."""
-    at = {"at_time": 0.5 * _mean([f.time[-1] for f in flights])}
-    if component.startswith("sensor:"):
-        channel = component.removeprefix("sensor:")
-        quantities: tuple[str, ...] = () if channel in FROM_ZERO else (channel,)
-    else:
-        quantities = ABOUT
-    for name in quantities:
-        of = [f.controls[name] if name in SURFACES else f.altitude if name == "altitude" else f.channel(name)
-              for f in flights]  # fmt: skip
-        at[f"at_{name}"] = _mean([float(np.median(values)) for values in of])
-    return at
-
-
-def _mean(values: Sequence[float]) -> float:
-    return float(np.mean(values))
 
 
 def described(posterior: Posterior) -> Hypothesis | None:
@@ -149,60 +99,64 @@ def describe_unknown(flights: Sequence[Reconstruction], candidates: Bank, eviden
     """
     assert hypothesis.unknown is not None
     component = hypothesis.unknown.component
-    flyable = {name for where, _, names in GENERIC if where == component for name in names}
     surest = max(hypothesis.unknown.terms, key=lambda term: abs(term[1]) / term[2])
-    if surest[0] not in flyable:
+    if surest[0] not in flyable(component, flights):
         return _told(component, hypothesis.unknown.terms, flights[0].reach)
     terms, at = choices(component, flights), condition(component, flights)
-    kept, only = _others(component, candidates)
-    precision = baseline.precision[np.ix_(kept, kept)]
-    centre = moved_by(flights[0], evidences[0].flight.parameters, only.nuisances)
+    only, precision = replace(candidates, families=(), terms=(), size=1 + len(candidates.nuisances)), baseline.precision
+    moved = moved_by(flights[0], evidences[0].flight.parameters, only.nuisances)
+    centre = nearer(moved if hypothesis.settled is None else hypothesis.settled.nuisances, only)
     first, n = 1 + len(only.nuisances), len(terms)
-    x, best, chosen, covariance = np.zeros(n), np.inf, np.zeros(n, bool), np.zeros((0, 0))
-    step, turn = x, centre
+    x, best, covariance = _begun(hypothesis.unknown, terms, flights[0].reach), np.inf, np.zeros((0, 0))
+    step, turn, tried, chosen = np.zeros(n), centre, np.full(n, AT_FIRST), x != 0.0
     for _ in range(ROUNDS):
-        gram = np.zeros((first + n, first + n))
-        for flight, evidence in zip(flights, evidences, strict=True):
-            rows = _rows(flight, only, hypothesis.fit, terms, at, x + step, turn)
-            gram += compare(flight, rows, evidence.gain, evidence.factor).gram
-        gram = with_prior(gram / tempering, only, precision, turn)
+        rows = [_rows(flight, only, hypothesis.fit, terms, at, x + step, turn, tried) for flight in flights]
+        gram = with_prior(_products(flights, evidences, rows, tried) / tempering, only, precision, turn)
+        tried = np.clip(STANDS_OUT / np.sqrt(np.maximum(np.diag(gram)[first:], 1e-12)), LEAST, 1.0)
         reduced = reduce(gram, only, np.zeros_like(precision))
-        cost = float(reduced[0, 0])
+        cost = float(reduced[0, 0]) + SHOWN**2 * np.count_nonzero(x + step)
+        if best < cost < best + SETTLED and np.any(step):
+            break
         if cost > best and np.any(step):  # too far: half the way from where it was better
             step, turn = 0.5 * step, 0.5 * (turn + centre)
             continue
         gained = best - cost
         x, best, centre = x + step, cost, turn
-        target, chosen, covariance = choose(reduced, first, x)
+        target, chosen, covariance = choose(reduced, first, x, int(np.count_nonzero(chosen)) + MORE)
         step = target - x
         weights = {first + j: float(step[j]) for j in range(n)}
         turn = nearer(centre + nuisance_mean(gram, only, weights), only)
-        if gained < SETTLED:
+        if gained < SETTLED and np.array_equal(chosen, x != 0.0):
             break
-    beside = np.zeros(len(candidates.nuisances))
-    beside[kept] = turn
-    return replace(_written(component, terms, at, x + step, chosen, covariance), nuisances=beside)
+    return replace(_written(component, terms, at, x + step, chosen, covariance), nuisances=turn)
+
+
+def _products(flights: Sequence[Reconstruction], evidences: Sequence[Evidence], rows: Sequence[NDArray],
+              tried: FloatArray) -> FloatArray:  # fmt: skip
+    """Whitened inner products of all records, of `_rows`, per unit of each term."""
+    gram = sum(compare(f, own, e.gain, e.factor).gram for f, e, own in zip(flights, evidences, rows, strict=True))
+    unit = np.r_[np.ones(len(rows[0]) - len(tried)), tried]
+    return np.asarray(gram / np.outer(unit, unit))
+
+
+def _begun(unknown: UnknownFit, terms: Sequence[Choice], reach: Mapping[str, float]) -> FloatArray:
+    """Sizes that the terms begin from: as the search has those that stand out."""
+    shown = {name: size * unit_of(name, unknown.component, reach) for name, size, error in unknown.terms
+             if abs(size) > SHOWN * error and name != "position*position*position"}  # which it has another unit for
+    return np.array([shown.get(term.term, 0.0) / term.size for term in terms])
 
 
 def _told(component: str, terms: Sequence[tuple[str, float, float]], reach: Mapping[str, float]) -> Description:
-    """Terms that the effect cannot fly, as the evidence has them: those that stand out, the surest first."""
+    """Terms that the effect cannot fly, as the evidence has them: those that stand out, the surest first.
+
+    A delay of a path is flown as a lag as long: the one memory that a path of the simulator has, to first order alike.
+    """
     order = sorted(terms, key=lambda term: -abs(term[1]) / term[2])
     kept = [term for term in order if abs(term[1]) > SHOWN * term[2]] or order[:1]
     units = [unit_of(name, component, reach) for name, _, _ in kept]
     told = tuple((name, size * unit, error * unit) for (name, size, error), unit in zip(kept, units, strict=True))
-    return Description(component, told, {}, np.diag([error**2 for _, _, error in told]))
-
-
-def _others(component: str, candidates: Bank) -> tuple[list[int], Bank]:
-    """Nuisances beside the component's own derivatives: which they are, and a bank of nothing else.
-
-    The derivatives of the component described are terms of the description: left to the nuisances, part of the gap
-    would be in neither of the two aircraft that are compared.
-    """
-    own = COEFFICIENT.get(component, "sensor") + "_"
-    kept = [j for j, nuisance in enumerate(candidates.nuisances) if not nuisance.parameter.startswith(own)]
-    nuisances = tuple(candidates.nuisances[j] for j in kept)
-    return kept, replace(candidates, nuisances=nuisances, families=(), terms=(), size=1 + len(nuisances))
+    late = {f"{component.removesuffix('_path')}_lag": size for name, size, _ in told if name == PURE_DELAY}
+    return Description(component, told, late, np.diag([error**2 for _, _, error in told]))
 
 
 def moved_by(flight: Reconstruction, moved: NDArray, directions: Sequence[Nuisance]) -> FloatArray:
@@ -221,22 +175,23 @@ def moved_by(flight: Reconstruction, moved: NDArray, directions: Sequence[Nuisan
 
 
 def _rows(flight: Reconstruction, only: Bank, known: SetFit, terms: Sequence[Choice], at: dict[str, float],
-          x: FloatArray, centre: FloatArray) -> NDArray:
-    """PARAMETERS: the model with the set and the terms `x` in it, a step of each nuisance, a unit of each term."""
+          x: FloatArray, centre: FloatArray, tried: FloatArray) -> NDArray:
+    """PARAMETERS: the model with the set and the terms `x` in it, a step of each nuisance, `tried` of each term."""
     first = 1 + len(only.nuisances)
     base = shifted(flight.parameters, only.nuisances, centre, flight.power_from)
     rows = np.repeat(base, first + len(terms))
     for j, nuisance in enumerate(only.nuisances, start=1):
         nuisance.apply(rows, j, flight.power_from)
     sizes = np.tile(x, (len(rows), 1))
-    sizes[first:] += np.eye(len(terms))
+    sizes[first:] += np.diag(tried)
     values: dict[str, dict[str, float | NDArray]] = {name: {**own} for name, own in known.values.items()}
     values["discrepancy"] = {**{t.number: sizes[:, j] * t.size for j, t in enumerate(terms)}, **at}
     return effects.with_effects(rows, values)
 
 
-def choose(reduced: FloatArray, first: int, x: FloatArray) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:
-    """Stepwise choice among terms, from inner products whose row 0 is the residual with terms `x` in it.
+def choose(reduced: FloatArray, first: int, x: FloatArray, most: int
+           ) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:  # fmt: skip
+    """Stepwise choice among terms, `most` of them, from inner products whose row 0 is the residual with `x` of them.
 
     Returns:
         Sizes of all terms (zero where not chosen), which were chosen, and the covariance of those.
@@ -256,7 +211,7 @@ def choose(reduced: FloatArray, first: int, x: FloatArray) -> tuple[FloatArray, 
 
     for _ in range(2 * n):
         tried = [sorted({*model} ^ {j}) for j in range(n)]  # one more, or one less
-        best = max(tried, key=gain)
+        best = max((subset for subset in tried if len(subset) <= most), key=gain)
         if gain(best) <= gain(model) and model:
             break
         model = best if best else model
@@ -284,6 +239,6 @@ def _needed(values: dict[str, float], at: dict[str, float]) -> dict[str, float]:
     def uses(name: str) -> bool:
         quantity = name.removeprefix("at_")
         words = {"time": ("time", "drift")}.get(quantity, (quantity,))
-        return any(word in number.split("_") for number in values for word in words)
+        return any(word in number.removesuffix("2").split("_") for number in values for word in words)
 
     return {name: value for name, value in at.items() if uses(name)}

@@ -11,9 +11,11 @@ from dataclasses import replace
 
 from icing_env.effects.derivatives import NUMBERS
 from sim2real.closing.discrepancy import Description
+from sim2real.closing.flyable import COEFFICIENT
 from sim2real.closing.remedy import Remedy
 from sim2real.library.candidates import LEAST, Nuisance
 from sim2real.posterior.hypotheses import Hypothesis, Settled
+from sim2real.posterior.widened import OWN_NUMBERS
 
 EFFECT = "derivatives"  # by which they are flown
 
@@ -25,7 +27,7 @@ def with_own_numbers(alone: Remedy, explained: Hypothesis | None, described: Des
     Args:
         alone: of `remedy`; where nothing can be flown of an explanation, what settled beside it is not believed.
         explained: the explanation; without a flight of it nothing settled.
-        described: its terms, if they are flown; derivatives at their component are among the terms then.
+        described: its terms, if they are flown; the numbers settled beside these.
         moves: the nuisances.
     """
     if not alone.values or explained is None or explained.settled is None:
@@ -37,9 +39,16 @@ def with_own_numbers(alone: Remedy, explained: Hypothesis | None, described: Des
     return replace(numbers, values=numbers.values | alone.values, covariance=alone.covariance)
 
 
+def of_component(change: Remedy, component: str) -> Remedy:
+    """The change with those of the model's own numbers alone that are derivatives at a component."""
+    own = COEFFICIENT.get(component, "none") + "_"
+    kept = {name: value for name, value in change.values.get(EFFECT, {}).items() if name.startswith(own)}
+    return replace(change, values={EFFECT: kept} | {n: v for n, v in change.values.items() if n != EFFECT})
+
+
 def own_numbers(settled: Settled, moves: Sequence[Nuisance]) -> Remedy:
     """The aircraft with derivatives and mass as they settled, and nothing else changed."""
-    own = {move.parameter: (max(move.factor * float(size), LEAST - 1.0), move.factor * float(error))
+    own = {move.parameter: (max(move.factor * float(size), LEAST - 1.0), OWN_NUMBERS * move.factor * float(error))
            for move, size, error in zip(moves, settled.nuisances, settled.error, strict=True)
            if move.parameter in NUMBERS}  # fmt: skip
     return Remedy({EFFECT: {name: change for name, (change, _) in own.items()}}, own=own)

@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from icing_env import effects
+from icing_env.effects.discrepancy import PATHS
 from icing_env.record import FloatArray
 from sim2real.closing import gap
 from sim2real.closing.discrepancy import Description
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
 from sim2real.posterior.sets import SetFit
+from sim2real.posterior.widened import SIZES
 from sim2real.prediction.windows import FREE, cut
 from sim2real.records.channels import SURFACES
 from sim2real.records.reconstruct import Reconstruction
@@ -45,15 +47,19 @@ class Remedy:
     @property
     def paths(self) -> tuple[str, ...]:
         """Surfaces whose actuator is part of it."""
-        entered = {component for name in self.values for component in effects.get(name).enters_at}
-        return tuple(surface for surface in SURFACES if f"{surface}_path" in entered)
+        entered = {component for name in self.values if name != "discrepancy"
+                   for component in effects.get(name).enters_at}  # fmt: skip
+        bent = self.values.get("discrepancy", {})
+        return tuple(surface for surface in SURFACES if f"{surface}_path" in entered
+                     or any(bent.get(number) for number in PATHS[surface]))  # fmt: skip
 
     @property
     def command(self) -> str:
         """A flight of the aircraft as diagnosed."""
         said = "icing fly clear_air"
         for name, values in self.values.items():
-            said += f" --effect {name}:" + ",".join(f"{k}={v:.6g}" for k, v in values.items())
+            told = {k: v for k, v in values.items() if v != 0.0} if name == "discrepancy" else values
+            said += f" --effect {name}:" + ",".join(f"{k}={v:.6g}" for k, v in told.items())
         return said
 
 
@@ -81,7 +87,8 @@ def remedy(explained: Hypothesis | None, description: Description | None) -> Rem
     """
     if explained is None:
         return Remedy()
-    values, parts = values_of(explained.fit), [explained.fit.covariance]
+    values, fitted = values_of(explained.fit), explained.fit.covariance
+    parts = [None if fitted is None else SIZES**2 * fitted]
     if description is not None and description.values:
         values["discrepancy"] = description.values
         parts.append(description.covariance)

@@ -29,6 +29,7 @@ from sim2real.library.terms import GENERIC
 from sim2real.posterior.generic import UnknownFit
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
 from sim2real.posterior.sets import SetFit
+from sim2real.posterior.widened import SIZES
 from sim2real.records.channels import TOLERANCE
 from sim2real.records.reconstruct import Reconstruction
 
@@ -69,7 +70,7 @@ class WholeModel:
 
     def remedy(self) -> Remedy:
         """The change of the model."""
-        return Remedy(self.values, self.covariance)
+        return Remedy(self.values, SIZES**2 * self.covariance)
 
     def answer(self) -> dict[str, Any]:
         """As the interface has an unknown, with all places beside the worst."""

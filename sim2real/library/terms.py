@@ -11,6 +11,8 @@ import numpy as np
 from scipy.signal import bilinear, lfilter
 
 from icing_env.atmosphere import density
+from icing_env.crosstalk import CROSSTALK
+from icing_env.discrepancy import FLOW
 from icing_env.record import FloatArray
 from sim2real.library.knots import hat, knots
 from sim2real.prediction.predictor import Push
@@ -29,51 +31,49 @@ class Term:
     row: int
 
 
+
+def regressor(of: str) -> str:
+    """The time course of what a sensor reads of another: "q_dot" of "qdot", "beta*beta" of "beta2"."""
+    if of.endswith("dot"):
+        return f"{of.removesuffix('dot')}_dot"
+    return "*".join([of.removesuffix("2")] * (1 + of.endswith("2")))
+
+
 # Generic discrepancies: component, what they act on, time courses ("1" constant, products of deviations, "time").
 GENERIC: tuple[tuple[str, str, tuple[str, ...]], ...] = (
-    ("x_force", "u", ("1", "alpha", "alpha*alpha", "airspeed", "elevator", "time")),
-    ("z_force", "w", ("1", "alpha", "q", "elevator", "alpha*alpha", "alpha*alpha*alpha", "airspeed", "time")),
+    ("x_force", "u", ("1", "alpha", "alpha*alpha", "airspeed", "elevator", "time", "beta*beta", "rudder*rudder")),
+    ("z_force", "w", ("1", "alpha", "q", "elevator", "alpha*alpha", "alpha*alpha*alpha", "airspeed", "time",
+                      "beta*beta", "alpha*q", "alpha_dot", "CT", "alpha*CT")),
     ("pitching_moment", "q", ("1", "alpha", "q", "elevator", "alpha*alpha", "alpha*elevator",
                               "alpha*alpha*alpha", "elevator*elevator*elevator", "q*q*q", "airspeed",
-                              "airspeed*airspeed", "time")),
-    ("y_force", "v", ("1", "beta", "p", "r", "rudder", "alpha*beta", "beta*beta*beta", "airspeed", "time")),
+                              "airspeed*airspeed", "time", "beta*beta", "elevator*airspeed", "aileron", "p", "r",
+                              "alpha*q", "CT", "alpha*CT", "alpha_dot", "theta")),
+    ("y_force", "v", ("1", "beta", "p", "r", "rudder", "alpha*beta", "beta*beta*beta", "airspeed", "time", "aileron",
+                      "alpha*p", "alpha*rudder", "beta*CT", "beta_dot")),
     ("rolling_moment", "p", ("1", "beta", "p", "r", "aileron", "rudder", "alpha*beta", "beta*beta*beta", "p*p*p",
-                              "aileron*aileron*aileron", "airspeed", "airspeed*airspeed", "time")),
+                              "aileron*aileron*aileron", "airspeed", "airspeed*airspeed", "time", "alpha", "q",
+                              "alpha*p", "alpha*r", "aileron*airspeed", "CT", "beta*CT", "beta_dot", "phi")),
     ("yawing_moment", "r", ("1", "beta", "p", "r", "aileron", "rudder", "alpha*beta", "beta*beta*beta", "r*r*r",
-                            "rudder*rudder*rudder", "airspeed", "airspeed*airspeed", "time")),
-    *((f"sensor:{c}", c, ("1", c, f"{c}_dot", "time")) for c in MEASURED[:8]),
-    *((f"sensor:{c}", c, ("1", c, "time")) for c in MEASURED[8:12]),
-)
+                            "rudder*rudder*rudder", "airspeed", "airspeed*airspeed", "time", "alpha", "q", "alpha*p",
+                            "alpha*r", "alpha*aileron", "alpha*rudder", "rudder*airspeed", "CT", "alpha*CT", "beta*CT",
+                            "beta_dot")),
+    *((f"sensor:{c}", c, ("1", c, *([f"{c}_dot"] if c in MEASURED[:8] else []), "time",
+                          *(regressor(of) for of in CROSSTALK.get(c, ())))) for c in MEASURED[:12]),
+    *((f"{s}_path", f"{s}_path", ("1", "position", "position*position*position", "direction", "side", "magnitude",
+                                  "airspeed", FLOW[s], *(other for other in SURFACES if other != s)))
+      for s in SURFACES),
+)  # fmt: skip
 # Structural modes under an accelerometer: what rings at so many Hz, in phase and a quarter behind. Light transports
 # have their first bending modes there (assumed), and each covers its neighbourhood.
 MODES = tuple(f"{kind}:{hertz:g}" for hertz in (2.0, 3.0, 4.5) for kind in ("rings", "rings_late"))
-# Terms that the effect `discrepancy` cannot fly, and that show where a gap lies nevertheless: across axes, with
-# thrust, in the paths of surfaces (no lags: actuators have their own, and channels are in step to a few ms at best) and
-# in the engines.
+# Terms that the effect `discrepancy` cannot fly, and that show where a gap lies nevertheless: of sensors, with thrust
+# or with a memory; of the paths of surfaces, with the memory of an actuator of second order (no lags: actuators have
+# their own, and channels are in step to a few ms at best); in the engines and of the wind.
 BEYOND: tuple[tuple[str, str, tuple[str, ...]], ...] = (
-    ("x_force", "u", ("beta*beta", "rudder*rudder")),
-    ("z_force", "w", ("beta*beta", "alpha*q", "alpha_dot", "CT", "alpha*CT")),
-    ("pitching_moment", "q", ("beta*beta", "elevator*airspeed", "aileron", "p", "r", "alpha*q", "CT", "alpha*CT",
-                              "alpha_dot", "theta")),
-    ("y_force", "v", ("aileron", "alpha*p", "alpha*rudder", "beta*CT", "beta_dot")),
-    ("rolling_moment", "p", ("alpha", "q", "alpha*p", "alpha*r", "aileron*airspeed", "CT", "beta*CT", "beta_dot",
-                              "phi")),
-    ("yawing_moment", "r", ("alpha", "q", "alpha*p", "alpha*r", "alpha*aileron", "alpha*rudder",
-                            "rudder*airspeed", "CT", "alpha*CT", "beta*CT", "beta_dot")),
-    ("sensor:airspeed", "airspeed", ("alpha", "beta", "beta*beta", "airspeed*airspeed", "CT")),
-    ("sensor:alpha", "alpha", ("airspeed", "q", "alpha*alpha", "CT")),
-    ("sensor:beta", "beta", ("alpha", "p", "r", "beta*beta", "CT")),
-    ("sensor:p", "p", ("q", "r", "az", "p*p")), ("sensor:q", "q", ("p", "r", "az", "q*q")),
-    ("sensor:r", "r", ("p", "q", "az", "r*r")),
-    ("sensor:phi", "phi", ("theta", "phi*phi", "slow_phi", "slow_ay")),
-    ("sensor:theta", "theta", ("phi", "theta*theta", "slow_theta", "slow_ax")),
-    ("sensor:ax", "ax", ("q_dot", "alpha", "az", "ax*ax")),
-    ("sensor:ay", "ay", ("p_dot", "r_dot", "ax", "az", "ay*ay", *MODES)),
-    ("sensor:az", "az", ("q", "q_dot", "ax", "az*az", *MODES)),
-    *((f"{s}_path", f"{s}_path", ("1", "position", "acceleration", "inertia", "position*position*position",
-                                  "direction", "side", "magnitude", "airspeed", flow,
-                                  *(other for other in SURFACES if other != s)))
-      for s, flow in zip(SURFACES, ("alpha", "p", "beta"), strict=True)),
+    *((f"sensor:{c}", c, ("CT",)) for c in ("airspeed", "alpha", "beta")),
+    ("sensor:phi", "phi", ("slow_phi", "slow_ay")), ("sensor:theta", "theta", ("slow_theta", "slow_ax")),
+    ("sensor:ay", "ay", MODES), ("sensor:az", "az", MODES),
+    *((f"{s}_path", f"{s}_path", ("acceleration", "inertia")) for s in SURFACES),
     ("propulsion", "thrust", ("both", "both*airspeed", "left", "left*airspeed")),
     ("wind", "wind", ("along*time", "across*time")),
 )  # fmt: skip
@@ -89,7 +89,7 @@ THRUST_SIZE = 0.1  # (assumed)
 WIND = "wind"
 WIND_SIZE, WIND_CHANGE = 0.1, 1.0  # m/s2: of a wind that gathers all the time, and at a knot (assumed)
 DEVIATION = {"alpha": 0.05, "beta": 0.05, "q": 0.1, "p": 0.2, "r": 0.1, "elevator": 0.04, "aileron": 0.08,
-             "rudder": 0.05, "airspeed": 5.0, "CT": 0.015, "phi": 0.2, "theta": 0.1, "ax": 1.0, "ay": 1.0, "az": 2.0,
+             "rudder": 0.05, "airspeed": 5.0, "CT": 0.0106, "phi": 0.2, "theta": 0.1, "ax": 1.0, "ay": 1.0, "az": 2.0,
              "p_dot": 1.0, "q_dot": 0.5, "r_dot": 0.3, "alpha_dot": 0.05, "beta_dot": 0.05,
              }  # fmt: skip  # what counts as one unit of a regressor (assumed)
 FLOW_RATES, WASHED = ("alpha_dot", "beta_dot"), 0.1  # rates of the flow's angles, and s over which they are taken
@@ -180,7 +180,7 @@ def in_common(flights: Sequence[Reconstruction]) -> list[Reconstruction]:
     """
     if not flights:
         return []
-    about = {factor: float(np.median(np.concatenate([_values(f, factor) for f in flights]))) for factor in DEVIATION}
+    about = {factor: float(np.median(np.concatenate([values_of(f, factor) for f in flights]))) for factor in DEVIATION}
     found = [replace(f, about=about, reach={}) for f in flights]
     names = {name for _, _, names in (*GENERIC, *BEYOND) for name in names if set(name.split("*")) <= set(DEVIATION)}
     square = {name: np.mean(np.concatenate([_course(f, name, True) for f in found]) ** 2) for name in names}
@@ -202,7 +202,7 @@ def _course(flight: Reconstruction, name: str, aerodynamic: bool = False) -> Flo
         return hat(flight, float(name.removeprefix(KNOT_AT)))
     out = np.ones(n)
     for factor in name.split("*"):
-        values = _values(flight, factor)
+        values = values_of(flight, factor)
         middle = flight.about[factor] if factor in flight.about else float(np.median(values))
         away = (values - middle) / DEVIATION[factor]
         if aerodynamic and factor in ("p", "q", "r", *FLOW_RATES):
@@ -212,13 +212,14 @@ def _course(flight: Reconstruction, name: str, aerodynamic: bool = False) -> Flo
     return out / flight.reach.get(name, 1.0)
 
 
-def _values(flight: Reconstruction, factor: str) -> FloatArray:
-    """A regressor: a control, both engines' power as a thrust coefficient, a channel, or its derivative."""
+def values_of(flight: Reconstruction, factor: str) -> FloatArray:
+    """A regressor: a control, both engines' thrust as a coefficient, a channel, or its derivative."""
     if factor == "CT" and flight.power_from == "balance":
         return np.zeros(len(flight.time))  # of the alpha and ax of which that power is made, it says nothing new
     if factor == "CT":
+        per_power = thrust_per_power(flight.parameters[0], flight.channel("airspeed"), flight.channel("alpha"))
         both = flight.controls["power_left"] + flight.controls["power_right"]
-        return np.asarray(both / (flight.channel("airspeed") * _pressed_area(flight)))
+        return np.asarray(both * per_power / _pressed_area(flight))
     if factor in flight.controls:
         return flight.controls[factor]
     if factor in FLOW_RATES:

@@ -20,7 +20,7 @@ from sim2real.records.channels import TOLERANCE
 def unit_of(term: str, component: str, reach: Mapping[str, float] | None = None) -> float:
     """What a generic coefficient of one stands for: of a force's or moment's coefficient, or a reading, per regressor.
 
-    Deviations are in the units of their channels; CT is power over airspeed, dynamic pressure and wing area.
+    Deviations are in the units of their channels; CT is thrust over dynamic pressure and wing area.
 
     Args:
         reach: of the records.

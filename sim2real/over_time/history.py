@@ -25,6 +25,7 @@ from sim2real.library.candidates import Bank, shifted
 from sim2real.over_time.by_stretch import SHARED, Way, cut_up, flown_products, gaussian, inwards, spans, ways, without
 from sim2real.posterior.hypotheses import Posterior
 from sim2real.posterior.sets import SetFit
+from sim2real.posterior.widened import SIZES
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.courses import projected
 from sim2real.signatures.evidence import Evidence
@@ -78,7 +79,7 @@ def histories(flights: Sequence[Reconstruction], candidates: Bank, evidences: Se
         posterior: what the records say.
         fit: the explanation's effects.
         change: the model's change by these, in the form in which they were found.
-        described: the terms of that form; derivatives at their component are among these, and not moved beside them.
+        described: the terms of that form, with where the model's own numbers settled beside them.
     """
     nuisances = posterior.settled if described is None or described.nuisances is None else described.nuisances
     if nuisances is None:
@@ -102,7 +103,7 @@ def histories(flights: Sequence[Reconstruction], candidates: Bank, evidences: Se
             break
     out = {}
     for m, (family, (way, _, error)) in enumerate(zip(fit.families, found, strict=True)):
-        band = np.clip(sizes[:, m, None] + error[:, None] * np.array([0.0, -1.96, 1.96]), low[m], high[m])
+        band = np.clip(sizes[:, m, None] + SIZES * error[:, None] * np.array([0.0, -1.96, 1.96]), low[m], high[m])
         told = tuple(Stretch(*at, *map(float, size)) for at, size in zip(spans(flights, cuts), band, strict=True))
         out[family.effect.name] = History(way.scope, way.in_time, told if way is not tried[0] else ())
     return out

@@ -17,6 +17,7 @@ import llvmlite.binding
 import numpy as np
 from numpy.typing import NDArray
 
+from icing_env.discrepancy import bends
 from icing_env.frames import direction_cosines, to_body
 from icing_env.parameters import PARAMETERS, copied
 from icing_env.record import FloatArray
@@ -170,7 +171,9 @@ def held(parameters: NDArray, dt: float) -> NDArray:
     for surface in SURFACES:
         out[f"{surface}_lag"], out[f"{surface}_rate"] = SLOW_SURFACE * dt, 1e3
         out[f"{surface}_min"], out[f"{surface}_max"] = -10.0, 10.0
-        out[f"{surface}_gearing"], out[f"{surface}_offset"] = 1.0, 0.0
+        out[f"{surface}_gearing"] = 1.0
+        for name in (f"{surface}_offset", *bends(surface)):
+            out[name] = 0.0
     out["hinge_elevator_hold"] = out["hinge_aileron_hold"] = 1e12
     out["spool_time"] = 1e12
     out["turbulence_sigma_w"], out["turbulence_tail_delay"] = 0.1 * STILL, 1.0

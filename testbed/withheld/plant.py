@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from testbed.withheld.described import described
+
 # positions in the state vector
 H, U, V, W, PHI, THETA, PSI, P, Q, R, DE, DA, DR, PL, PR, ADW = range(16)
 DE1, DA1, DR1, ADW2, PL2, PR2, SLOSH, SLOSH1, PLAY, BLAG, ALAG = range(16, 27)
@@ -162,16 +164,9 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
           + p.Cn_betadot * (b - y[BLAG]) / 0.1 * p.span / (2.0 * V_) + p.Cn_pfactor * a * ct
           + p.Cn_alpha_aileron * a * da)  # fmt: skip
 
-    # what a description of something unknown adds, docs/model.md 9
-    cx += p.CX_elevator * de + p.CX_airspeed * V_ + p.CX_time * t
-    cy += p.CY_alpha_beta * a * b + p.CY_beta3 * b**3 + p.CY_airspeed * V_ + p.CY_time * t
-    cz += p.CZ_alpha2 * a * a + p.CZ_alpha3 * a**3 + p.CZ_airspeed * V_ + p.CZ_time * t
-    cl += p.Cl_beta3 * b**3 + p.Cl_p3 * ph**3 + p.Cl_aileron3 * da**3
-    cl += p.Cl_alpha_beta * a * b + p.Cl_airspeed * V_ + p.Cl_airspeed2 * V_ * V_ + p.Cl_time * t
-    cm += p.Cm_alpha2 * a * a + p.Cm_alpha_elevator * a * de + p.Cm_airspeed * V_ + p.Cm_airspeed2 * V_ * V_
-    cm += p.Cm_alpha3 * a**3 + p.Cm_elevator2 * de * de + p.Cm_elevator3 * de**3 + p.Cm_q3 * qh**3 + p.Cm_time * t
-    cn += p.Cn_beta3 * b**3 + p.Cn_r3 * rh**3 + p.Cn_rudder3 * dr**3
-    cn += p.Cn_alpha_beta * a * b + p.Cn_airspeed * V_ + p.Cn_airspeed2 * V_ * V_ + p.Cn_time * t
+    bdot = (b - y[BLAG]) / 0.1 * p.span / (2.0 * V_)
+    mx, my, mz, ml, mm, mn = described(p, t, V_, a, b, ph, qh, rh, de, da, dr, ct, bdot, sph * cth, sth)
+    cx, cy, cz, cl, cm, cn = cx + mx, cy + my, cz + mz, cl + ml, cm + mm, cn + mn
 
     # forces, moments about the c.g., rigid body
     X, Y, Z = qS * cx + thrust, qS * cy, qS * cz

@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from testbed.withheld.described import DESCRIBED
+
 HERE = Path(__file__).resolve()
 FILES = ("aircraft/twin_otter.toml", "instruments/nasa_2002.toml", "ice/dhc6.toml")
 DERIVATIVES = (
@@ -90,7 +92,7 @@ PUBLISHED = published()
 _ICE = ("k_", "edge_", "frontal_", "eta_", "shed_", "boot_", "glaze_", "rime_", "melt_", "sublimation_", "prop_heat",
         "noise_", "bias_", "scale_")  # fmt: skip
 AIRFRAME = tuple(n for n in PUBLISHED if not n.startswith(_ICE))
-DTYPE = np.dtype([(n, np.float64) for n in (*AIRFRAME, *KNOBS)])
+DTYPE = np.dtype([(n, np.float64) for n in (*AIRFRAME, *KNOBS, *DESCRIBED)])
 
 
 def airframe(changes: Mapping[str, float] | None = None) -> NDArray:

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from testbed.withheld.described import CENTRE, CENTRED, DESCRIBED, OWN
 from testbed.withheld.distance import MOTION
 from testbed.withheld.draw import Design
 from testbed.withheld.effects import BY_NAME
@@ -32,12 +33,14 @@ from testbed.withheld.windows import gap_of, held
 from testbed.workers import a_core_each
 
 FLOWN_AGAIN = ("single", "pair")  # tiers with an effect that the library holds
-# What describes something unknown; and all that the plant has to add to: derivatives, constants, instruments' errors.
-DESCRIBED = ("CX_elevator", "CZ_alpha2", "Cm_alpha2", "Cm_elevator2", "Cm_alpha_elevator", "CY_alpha_beta",
-             "Cl_alpha_beta", "Cn_alpha_beta", "Cl_airspeed2", "Cm_airspeed2", "Cn_airspeed2", "CZ_alpha3", "Cm_alpha3",
-             "Cm_elevator3", "Cm_q3", "CY_beta3", "Cl_beta3", "Cl_p3", "Cl_aileron3", "Cn_beta3", "Cn_r3", "Cn_rudder3",
-             *(f"{c}_{of}" for c in ("CX", "CY", "CZ", "Cl", "Cm", "Cn") for of in ("airspeed", "time")))  # fmt: skip
-NUMBERS = {*DERIVATIVES, *SENSOR_KNOBS, *DESCRIBED, "CY_0", "Cl_0", "Cn_0", "Cl_alpha"}
+# All that the plant has to add to: derivatives, constants, instruments' errors, what describes something unknown.
+NUMBERS = {*DERIVATIVES, *SENSOR_KNOBS, *DESCRIBED, *OWN, *CENTRED, "CY_0", "Cl_0", "Cn_0", "Cl_alpha", "Cn_aileron",
+           "Cm_CT", "CZ_CT", "Cm_alphadot", *(f"{s}_{own}" for s in ("elevator", "aileron", "rudder")
+                                              for own in ("gearing", "offset", "lag", "cubic"))}  # fmt: skip
+# Numbers of surfaces' paths, each the generator's times so much.
+BENT = {f"{s}_{of}": (f"{s}_{own}", times) for s in ("elevator", "aileron", "rudder")
+        for of, own, times in (("gearing", "gearing", 1.0), ("offset", "offset", 1.0), ("lag", "lag", 1.0),
+                               ("cube", "cubic", 0.01))}  # fmt: skip
 Parts = tuple[tuple[str, str, float], ...]
 
 
@@ -152,7 +155,9 @@ def numbers(values: dict[str, float]) -> tuple[dict[str, float], list[str]]:
         if value == 0.0 or name.startswith("at_"):
             continue
         of, _, term = name.partition("_")
-        if of == "scale":
+        if name in BENT:
+            more = {BENT[name][0]: value * BENT[name][1]}
+        elif of == "scale":
             more = {name: value, f"bias_{term}": -value * values.get(f"at_{term}", 0.0)}
         elif of in ("bias", "delay", "drift"):
             more = {name: value}
@@ -174,8 +179,12 @@ def written_out(coefficient: str, factors: list[str], value: float, values: dict
         left = [f for f, keep in zip(factors, kept, strict=True) if keep]
         about = [-values.get(f"at_{f}", 0.0) for f, keep in zip(factors, kept, strict=True) if not keep]
         of = f"{left[0]}{len(left)}" if len(left) > 1 and len(set(left)) == 1 else "_".join(left) or "0"
-        name = f"{coefficient}_{of}"
-        found[name] = found.get(name, 0.0) + value * math.prod(about)
+        name, size = f"{coefficient}_{of}", value * math.prod(about)
+        found[name] = found.get(name, 0.0) + size
+        if name in CENTRED:
+            found[CENTRED[name]] = found.get(CENTRED[name], 0.0) + CENTRE * size
+        if name == "Cm_alphadot":  # which the plant has as a part of Cm_q
+            found["Cm_q"] = found.get("Cm_q", 0.0) + size
     return found
 
 
