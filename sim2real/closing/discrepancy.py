@@ -22,13 +22,13 @@ from icing_env.record import FloatArray
 from sim2real.baseline.references import Baseline
 from sim2real.closing.flyable import Choice, choices, condition, flyable
 from sim2real.flown.settling import nearer
-from sim2real.library.candidates import Bank, Nuisance, shifted
+from sim2real.library.candidates import NUISANCE_STEP, Bank, Nuisance, shifted
 from sim2real.library.terms import PURE_DELAY
 from sim2real.library.units import unit_of
 from sim2real.posterior.attribution import nuisance_mean, reduce, with_prior
 from sim2real.posterior.form import WORTH
 from sim2real.posterior.generic import COURSE, UnknownFit
-from sim2real.posterior.hypotheses import Hypothesis, Posterior
+from sim2real.posterior.hypotheses import Hypothesis, Posterior, Settled
 from sim2real.posterior.sets import SetFit
 from sim2real.posterior.singles import DETECTABLE
 from sim2real.records.reconstruct import Reconstruction
@@ -53,14 +53,14 @@ class Description:
         terms: (name, size, standard error) of those that earned their place, the surest first.
         values: of the effect `discrepancy`.
         covariance: of the sizes of `terms`.
-        nuisances: where the model's own numbers settled beside them [n]; None if not flown.
+        settled: the model's own numbers beside them; None if not flown.
     """
 
     component: str
     terms: tuple[tuple[str, float, float], ...]
     values: dict[str, float]
     covariance: FloatArray
-    nuisances: FloatArray | None = None
+    settled: Settled | None = None
 
     @property
     def kind(self) -> str:
@@ -128,7 +128,16 @@ def describe_unknown(flights: Sequence[Reconstruction], candidates: Bank, eviden
         turn = nearer(centre + nuisance_mean(gram, only, weights), only)
         if gained < SETTLED and np.array_equal(chosen, x != 0.0):
             break
-    return replace(_written(component, terms, at, x + step, chosen, covariance), nuisances=turn)
+    settled = Settled(turn, _errors(gram, first, chosen))
+    return replace(_written(component, terms, at, x + step, chosen, covariance), settled=settled)
+
+
+def _errors(gram: FloatArray, first: int, chosen: NDArray[np.bool_]) -> FloatArray:
+    """Standard errors of nuisances [n], their prior being in the inner products, the terms chosen free beside them."""
+    kept = [*range(1, first), *(first + np.flatnonzero(chosen))]
+    unit = np.r_[np.full(first - 1, NUISANCE_STEP), np.ones(len(kept) - first + 1)]
+    inner = gram[np.ix_(kept, kept)] / np.outer(unit, unit)
+    return np.asarray(np.sqrt(np.diag(np.linalg.inv(inner + np.diag((unit == 1.0) * RIDGE)))[: first - 1]), np.float64)
 
 
 def _products(flights: Sequence[Reconstruction], evidences: Sequence[Evidence], rows: Sequence[NDArray],

@@ -30,11 +30,11 @@ def with_own_numbers(alone: Remedy, explained: Hypothesis | None, described: Des
         described: its terms, if they are flown; the numbers settled beside these.
         moves: the nuisances.
     """
-    if not alone.values or explained is None or explained.settled is None:
+    settled = None if explained is None else explained.settled
+    if described is not None and described.settled is not None:
+        settled = described.settled
+    if not alone.values or settled is None:
         return alone
-    settled = explained.settled
-    if described is not None and described.nuisances is not None:
-        settled = replace(settled, nuisances=described.nuisances)
     numbers = own_numbers(settled, moves)
     return replace(numbers, values=numbers.values | alone.values, covariance=alone.covariance)
 

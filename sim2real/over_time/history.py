@@ -81,7 +81,8 @@ def histories(flights: Sequence[Reconstruction], candidates: Bank, evidences: Se
         change: the model's change by these, in the form in which they were found.
         described: the terms of that form, with where the model's own numbers settled beside them.
     """
-    nuisances = posterior.settled if described is None or described.nuisances is None else described.nuisances
+    beside = None if described is None else described.settled
+    nuisances = posterior.settled if beside is None else beside.nuisances
     if nuisances is None:
         nuisances = moved_by(flights[0], evidences[0].flight.parameters, candidates.nuisances)
     cuts = [cut_up(flight) for flight in flights]

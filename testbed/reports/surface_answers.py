@@ -63,4 +63,6 @@ def _predicted(flight: Reconstruction, surface: str, found: Diagnosis, result: M
                      for p in (flight.parameters, found.details.change(flight.parameters)))  # fmt: skip
     unknown = result["unknown"]
     here = unknown and unknown["component"] == f"{surface}_path" and result["verdict"] == "unknown"
-    return before, np.interp(flight.time - (late_by(unknown) if here else 0.0), flight.time, after)
+    if here and (late := late_by(unknown)):  # what the simulator flies as a lag is told as a delay
+        after = np.interp(flight.time - late, flight.time, before)
+    return before, after
