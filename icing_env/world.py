@@ -256,9 +256,10 @@ class World:
         return self.task["truncated"] > 0.0
 
     def _arrays(self) -> dict[str, NDArray]:
-        f = self.fleet
+        f = self.fleet  # parameters without their names, which are more than `numpy.load` takes for safe
+        numbers = f.parameters.view(np.float64).reshape(len(f.parameters), -1)
         return {"state": f.state, "measurement": f.measurement, "current": f.current, "command": f.command,
-                "outcome": f.outcome, "parameters": f.parameters, "task": self.task, "trimmed": self.trimmed,
+                "outcome": f.outcome, "parameters": numbers, "task": self.task, "trimmed": self.trimmed,
                 "seed": self.seed, "episode": self.episode, "observation": self.view.out,
                 **{f"loop_{name}": array for name, array in self.loop.memory().items()}}
 

@@ -23,6 +23,7 @@ from sim2real.closing.discrepancy import describe_unknown
 from sim2real.closing.own_numbers import own_numbers, with_own_numbers
 from sim2real.closing.remedy import Remedy, remedy
 from sim2real.library.candidates import Bank, not_testable
+from sim2real.posterior.form import home
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
 from sim2real.prediction.windows import COMPARED, FREE, fly
 from sim2real.records.channels import MEASURED
@@ -74,11 +75,16 @@ def ladder(flights: Sequence[Reconstruction], others: Sequence[Reconstruction], 
 
 
 def runner_up(posterior: Posterior, explained: Hypothesis | None) -> Hypothesis:
-    """The most probable explanation that shares nothing with the diagnosed one, and is one."""
+    """The most probable explanation that shares nothing with the diagnosed one, and is one.
+
+    Something unknown where a diagnosed effect enters, or beside something unknown, may be that itself in other words.
+    """
     taken = set(explained.effects) if explained is not None else set()
+    places = home(tuple(sorted(taken)))
     strange = explained is not None and explained.unknown is not None
     return next(h for h in posterior.hypotheses if (h.effects or h.unknown is not None)
-                and h is not explained and not taken & set(h.effects) and not (strange and h.unknown is not None))
+                and h is not explained and not taken & set(h.effects)
+                and not (h.unknown is not None and (strange or h.unknown.component in places)))
 
 
 def search_on_nothing(flights: Sequence[Reconstruction], others: Sequence[Reconstruction], candidates: Bank,

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from icing_env.effects.derivatives import NUMBERS
 from sim2real.closing.discrepancy import Description
 from sim2real.closing.flyable import COEFFICIENT
@@ -18,6 +20,7 @@ from sim2real.posterior.hypotheses import Hypothesis, Settled
 from sim2real.posterior.widened import OWN_NUMBERS
 
 EFFECT = "derivatives"  # by which they are flown
+FARTHEST = 3.5  # prior deviations that none of some thirty numbers is off by, but for one aircraft in seventy
 
 
 def with_own_numbers(alone: Remedy, explained: Hypothesis | None, described: Description | None,
@@ -27,12 +30,13 @@ def with_own_numbers(alone: Remedy, explained: Hypothesis | None, described: Des
     Args:
         alone: of `remedy`; where nothing can be flown of an explanation, what settled beside it is not believed.
         explained: the explanation; without a flight of it nothing settled.
-        described: its terms, if they are flown; the numbers settled beside these.
+        described: its terms, if they are flown, and the numbers that settled beside these. Of an explanation that the
+            search did not fly they count where all are some aircraft's: one so far off would be the explanation.
         moves: the nuisances.
     """
-    settled = None if explained is None else explained.settled
-    if described is not None and described.settled is not None:
-        settled = described.settled
+    settled, beside = None if explained is None else explained.settled, None if described is None else described.settled
+    if beside is not None and (settled is not None or float(np.max(np.abs(beside.nuisances))) < FARTHEST):
+        settled = beside
     if not alone.values or settled is None:
         return alone
     numbers = own_numbers(settled, moves)
