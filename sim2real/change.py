@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 from sim2real.answer import judge
 from sim2real.baseline.references import Baseline
-from sim2real.closing import gap
+from sim2real.closing import gap, whole_model
 from sim2real.closing.discrepancy import Description, describe_unknown, described, in_other_form
 from sim2real.closing.own_numbers import of_component, with_own_numbers
 from sim2real.closing.remedy import Remedy, leading, remedy
-from sim2real.closing.whole_model import WholeModel, fit_whole_model, incomplete, takes_most, with_whole_model
+from sim2real.closing.whole_model import WholeModel
 from sim2real.library.candidates import Bank
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
 from sim2real.records.reconstruct import Reconstruction
@@ -79,24 +79,40 @@ def changed(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
     progress("flying the records freely, before and after")
     left = flown_freely(flights, sigmas, alone, seed)
     change = with_own_numbers(alone, told.explained, told.flown, candidates.nuisances)
+    if any_aircraft and whole_model.suspected(posterior):
+        judged = _judged(flights, told, alone, change, left)
+        all_of_it = (told.flown is None or bool(told.flown.values)) and not posterior.best.varies
+        if whole_model.incomplete(posterior, judged, all_of_it):
+            whole = _whole(flights, candidates, posterior, told, sigmas, judged, seed, progress)
+            if whole is not None:
+                return whole
     training = left if change is alone else replace(left, after=gap.of_all(flights, change, change.paths))
-    judged = left
-    if told.flown is not None and change is not alone:  # terms there were fitted beside the numbers of their component
-        at_home = of_component(change, told.flown.component)
-        judged = replace(left, after=gap.of_all(flights, at_home, at_home.paths))
-    all_of_it = (told.flown is None or bool(told.flown.values)) and not posterior.best.varies
-    if any_aircraft and incomplete(posterior, judged, all_of_it):
-        progress("fitting all numbers of the model, since what was found is not all")
-        whole = fit_whole_model(flights, candidates, posterior)
-        everything = whole.remedy()
-        closer = flown_freely(flights, sigmas, everything, seed)
-        if takes_most(judged, closer):
-            posterior = with_whole_model(posterior, whole)
-            told = Told(leading(judge(posterior)[0], posterior), told.unknown, None)
-            alone = remedy(told.explained, None)
-            left = replace(closer, after=gap.of_all(flights, alone, everything.paths))
-            return Changed(posterior, told, whole, alone, left, everything, closer)
     return Changed(posterior, told, None, alone, left, change, training)
+
+
+def _judged(flights: Sequence[Reconstruction], told: Told, alone: Remedy, change: Remedy, left: gap.Energy
+            ) -> gap.Energy:  # fmt: skip
+    """The records in free flight with an explanation; beside terms, the numbers of their component were fitted too."""
+    if told.flown is None or change is alone:
+        return left
+    at_home = of_component(change, told.flown.component)
+    return replace(left, after=gap.of_all(flights, at_home, at_home.paths))
+
+
+def _whole(flights: Sequence[Reconstruction], candidates: Bank, posterior: Posterior, told: Told,
+           sigmas: Sequence[float], judged: gap.Energy, seed: int, progress: Progress) -> Changed | None:  # fmt: skip
+    """All numbers of the model changed; None where that takes no more of the gap than what was found before."""
+    progress("fitting all numbers of the model, since what was found is not all")
+    whole = whole_model.fit_whole_model(flights, candidates, posterior)
+    everything = whole.remedy()
+    closer = flown_freely(flights, sigmas, everything, seed)
+    if not whole_model.takes_most(judged, closer):
+        return None
+    posterior = whole_model.with_whole_model(posterior, whole)
+    told = Told(leading(judge(posterior)[0], posterior), told.unknown, None)
+    alone = remedy(told.explained, None)
+    left = replace(closer, after=gap.of_all(flights, alone, everything.paths))
+    return Changed(posterior, told, whole, alone, left, everything, closer)
 
 
 def _told(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,

@@ -92,17 +92,29 @@ class _Number:
     family: Family | None
 
 
+def suspected(posterior: Posterior) -> bool:
+    """Whether the best explanation leaves many times the noise, or may take numbers along that are too far off."""
+    return posterior.tempering > ANOTHER or _stretched(posterior)
+
+
 def incomplete(posterior: Posterior, flown: gap.Energy, all_of_it: bool) -> bool:
-    """Whether the best explanation leaves much, or takes numbers of the published model along that are too far off.
+    """Whether a suspected explanation is not all: numbers too far off, or much left in free flight where noise is left.
 
     Args:
         flown: the records in free flight, with that explanation; what only stretches the model leaves a gap there too.
+            What is told of the noise is told without its form in terms, which may be all that there was left.
         all_of_it: whether all of the explanation flew; what did not leaves a gap there for that reason alone.
     """
-    if posterior.tempering > ANOTHER or posterior.settled is None or not all_of_it:
-        return posterior.tempering > ANOTHER
-    stretched = float(posterior.settled @ posterior.settled) > chi2.isf(STRETCHED, len(posterior.settled))
-    return stretched and gap.g(flown.after, flown.alone) >= gap.null_quantile(flown.alone)
+    left = gap.g(flown.after, flown.alone) >= gap.null_quantile(flown.alone)
+    if posterior.tempering > ANOTHER:
+        return left or not all_of_it or posterior.settled is None or _stretched(posterior)
+    return left and all_of_it and _stretched(posterior)
+
+
+def _stretched(posterior: Posterior) -> bool:
+    """Whether the numbers that go with the best explanation are farther from published ones than any aircraft's."""
+    settled = posterior.settled
+    return settled is not None and float(settled @ settled) > chi2.isf(STRETCHED, len(settled))
 
 
 def takes_most(before: gap.Energy, fitted: gap.Energy) -> bool:
