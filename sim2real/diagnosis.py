@@ -93,37 +93,21 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         InputError: no records, an unknown effect in `without`, or a record that cannot be used.
     """
     began = time.perf_counter()
-    if not records:
-        raise InputError("no record to diagnose: give at least one flight record")
-    without = tuple(without)
-    for name in without:
-        if name not in effects.LIBRARY:
-            raise InputError(f"no effect '{name}' to leave out: {nearest(name, list(effects.LIBRARY))}")
-    candidates = bank(without)
-    baseline = Baseline(aircraft.load(), np.eye(len(candidates.nuisances)))
-    if reference:
-        progress("fitting the model to the reference flights")
-        baseline = fit_baseline(_reconstructed(reference, None, simulator), candidates)
-        candidates = replace(candidates, clean=baseline.clean)
-    flights = _reconstructed(records, baseline, simulator)
-    others = _reconstructed(held_out, baseline, simulator)
+    at_hand = _at_hand(records, held_out, reference, tuple(without), simulator, progress)
+    flights, others, candidates, baseline = at_hand.flights, at_hand.others, at_hand.candidates, at_hand.baseline
     untestable = not_testable(flights, candidates)
     evidences, posterior = fit(flights, candidates, untestable, baseline, progress)
     found = changed(flights, candidates, evidences, baseline, posterior, seed, not (reference or simulator), progress)
     posterior, explained = found.posterior, found.told.explained
-    sizes = dict[str, History]()
-    if explained is not None and explained.effects and found.whole is None:
-        progress("looking at how the sizes went along the records")
-        sizes = histories(flights, candidates, evidences, baseline, posterior, explained.fit, found.alone,
-                          found.told.flown)
+    sizes = _over_time(at_hand, evidences, found, progress)
     progress("flying what these records could have revealed")
     shown = limits(evidences, candidates, baseline, posterior.tempering, posterior.fits)
     sigma = float(np.mean([e.sigma_w for e in evidences]))
     tested, less = _held_out(others, found, sigma, seed) if others else (None, None)
-    rungs = dict[str, Any]()
+    closes = {"training": _closed(found), "held_out": gap.held_out(tested, seed, less)}
     if climb and tested is not None and less is not None:
-        rungs["ladder"] = ladder(flights, others, candidates, baseline, evidences, posterior, explained,
-                                 found.change.paths, tested, less, seed, progress)  # fmt: skip
+        closes["ladder"] = ladder(flights, others, candidates, baseline, evidences, posterior, explained,
+                                  found.change.paths, tested, less, seed, progress)  # fmt: skip
     lacking = found.whole or found.told.unknown
     verdict, hypotheses = judge(posterior)
     progress("looking for what to fly next")
@@ -138,16 +122,58 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         not_testable=[{"effect": name, "why": why} for name, why in sorted(untestable.items())],
         detection_limits=detection_limits(posterior.fits, shown),
         unknown=None if lacking is None else lacking.answer(),
-        gap={"training": _closed(found), "held_out": gap.held_out(tested, seed, less)} | rungs,
+        gap=closes,
         next_manoeuvre=_next(flights[0], candidates, posterior, hypotheses, sigma, baseline.precision),
         resimulate=resimulation(found.change, found.training, flights, evidences),
         data_problems=problems((*flights, *others)),
-        provenance=provenance(flights, others, evidences, without, len(reference), seed)
+        provenance=provenance(flights, others, evidences, at_hand.without, len(reference), seed)
         | {"tempering": posterior.tempering, "model": baseline.answer() if reference else None},
         seconds=time.perf_counter() - began,
         details=Details(tuple(flights), tuple(others), tuple(evidences), posterior, found.change, found.training,
                         tested),
     )
+
+
+@dataclass(frozen=True)
+class _AtHand:
+    """What a diagnosis begins with: the records over the model that references corrected, and the library.
+
+    without: effects left out of it.
+    """
+
+    flights: list[Reconstruction]
+    others: list[Reconstruction]
+    candidates: Bank
+    baseline: Baseline
+    without: tuple[str, ...]
+
+
+def _at_hand(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord], reference: Sequence[FlightRecord],
+             without: tuple[str, ...], simulator: Rollout | None, progress: Progress) -> _AtHand:  # fmt: skip
+    if not records:
+        raise InputError("no record to diagnose: give at least one flight record")
+    for name in without:
+        if name not in effects.LIBRARY:
+            raise InputError(f"no effect '{name}' to leave out: {nearest(name, list(effects.LIBRARY))}")
+    candidates = bank(without)
+    baseline = Baseline(aircraft.load(), np.eye(len(candidates.nuisances)))
+    if reference:
+        progress("fitting the model to the reference flights")
+        baseline = fit_baseline(_reconstructed(reference, None, simulator), candidates)
+        candidates = replace(candidates, clean=baseline.clean)
+    return _AtHand(_reconstructed(records, baseline, simulator), _reconstructed(held_out, baseline, simulator),
+                   candidates, baseline, without)
+
+
+def _over_time(at_hand: _AtHand, evidences: Sequence[Evidence], found: Changed, progress: Progress
+               ) -> dict[str, History]:  # fmt: skip
+    """How the sizes of the effects found went along the records."""
+    explained = found.told.explained
+    if explained is None or not explained.effects or found.whole is not None:
+        return {}
+    progress("looking at how the sizes went along the records")
+    return histories(at_hand.flights, at_hand.candidates, evidences, at_hand.baseline, found.posterior, explained.fit,
+                     found.alone, found.told.flown)
 
 
 def _held_out(others: Sequence[Reconstruction], found: Changed, sigma: float, seed: int

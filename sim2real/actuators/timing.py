@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from icing_env.record import FloatArray
 from sim2real.actuators.paths import counted, follow, moves, position_noise
@@ -56,10 +57,14 @@ def _late(flight: Reconstruction, shift: float) -> Reconstruction:
     """The record with its surface commands `shift` samples later."""
     if shift == 0.0:
         return flight
-    at = np.arange(len(flight.time), dtype=np.float64)
-    later = {n: np.interp(at - shift, at, c) if n.endswith("_command") else c for n, c in flight.commands.items()}
+    later = {n: _later(c, shift) if n.endswith("_command") else c for n, c in flight.commands.items()}
     return replace(flight, commands=later, notes=(
         *flight.notes, f"commands taken {shift:g} samples later: positions follow them better so"))
+
+
+def _later(command: FloatArray, shift: float) -> FloatArray:
+    at = np.arange(len(command), dtype=np.float64)
+    return command if shift == 0.0 else np.interp(at - shift, at, command)
 
 
 def _sharpest(flights: Sequence[Reconstruction], moved: Sequence[str]) -> list[float]:
@@ -80,18 +85,25 @@ def _counted(flights: Sequence[Reconstruction], surface: str) -> int:
 def _square(flights: Sequence[Reconstruction], surface: str, shift: float, other: float) -> float:
     """Whitened square of a surface's positions behind its command, `shift` samples later; another lag costs `other`."""
     lags = LAGS if np.isfinite(other) else LAGS[:1]
-    total = np.sum([_left(_late(flight, shift), surface, lags) for flight in flights if moves(flight, surface)], axis=0)
+    total = np.sum([_left(flight, surface, shift, lags) for flight in flights if moves(flight, surface)], axis=0)
     return float(min(total[0], total.min() + other))
 
 
-def _left(flight: Reconstruction, surface: str, lags: FloatArray) -> FloatArray:
-    """Whitened square at every lag beside the published one, geared and shifted as suits best."""
-    rows = np.repeat(flight.parameters, len(lags))
-    rows[f"{surface}_lag"] = np.maximum(rows[f"{surface}_lag"] + lags, 0.0)
+def _left(flight: Reconstruction, surface: str, shift: float, lags: FloatArray) -> FloatArray:
+    """Whitened square at every lag beside the published one, geared and offset as suits best."""
+    rows = flight.once(("lags", surface, len(lags)), lambda: _with_lags(flight, surface, lags))
     recorded = flight.positions[surface]
     good, (_, noise) = np.isfinite(recorded), position_noise(flight, surface)
-    where = follow(flight.commands[f"{surface}_command"], recorded[good][0], rows, surface, flight.dt)[good]
+    command = _later(flight.commands[f"{surface}_command"], shift)
+    where = follow(command, recorded[good][0], rows, surface, flight.dt)[good]
     wanted, weight = recorded[good, None], noise[good, None] ** -2.0
     away, left = (x - np.sum(weight * x, axis=0) / np.sum(weight) for x in (where, wanted))
     gear = np.sum(weight * away * left, axis=0) / np.maximum(np.sum(weight * away**2, axis=0), 1e-300)
     return np.asarray(np.sum(weight * (left - gear * away) ** 2, axis=0))
+
+
+def _with_lags(flight: Reconstruction, surface: str, lags: FloatArray) -> NDArray:
+    """PARAMETERS of one row for each lag beside the published one."""
+    rows = np.repeat(flight.parameters, len(lags))
+    rows[f"{surface}_lag"] = np.maximum(rows[f"{surface}_lag"] + lags, 0.0)
+    return rows
