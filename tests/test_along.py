@@ -10,7 +10,8 @@ import pytest
 from icing_env import scenario
 from sim2real.library.candidates import bank
 from sim2real.library.terms import pushes
-from sim2real.prediction.along import REST, STATES
+from sim2real.prediction.along import REST
+from sim2real.prediction.correction import STATES
 from sim2real.prediction.predictor import Predictor, Push
 from sim2real.records.channels import MEASURED, SURFACES
 from sim2real.records.powers import thrust_per_power

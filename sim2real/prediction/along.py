@@ -36,13 +36,11 @@ from icing_env.sensors import filter_flow_and_inertial, read_gyros_quietly, read
 from icing_env.simulate import CLOCK, NUMBER
 from icing_env.turbulence import advance_turbulence, drift_turbulence
 from icing_env.types import COMMAND, CONTINUOUS, CURRENT, MEASUREMENT, OUTCOME, STATE
+from sim2real.prediction.correction import CHANGED, E0, E1, E2, E3, X, columns, follow_record
 from sim2real.records.channels import FED_BACK, MEASURED, SURFACES
 
 STILL = 1e-9  # m/s: gusts below it keep their states but draw nothing
 PRESENTED = 50  # steps between two looks at what mass, ice and height make of the coefficients (held over a record)
-STATES = ("u", "v", "w", "p", "q", "r", "altitude", "alpha_downwash", "dryden_u", "dryden_v1", "dryden_v2",
-          "dryden_w1", "dryden_w2", "gust_u", "gust_v", "gust_w", "gust_w_tail", "pitot", "vane_alpha", "vane_beta",
-          *(f"filtered_{c}" for c in ("alpha", "beta", "p", "q", "r", "ax", "ay", "az")))  # fmt: skip
 SLOW_SURFACE = 4.0  # a surface's lag in steps: it moves nearly in a straight line from sample to sample
 CONTROLS = (*SURFACES, "flap", "power_left", "power_right")
 
@@ -53,20 +51,8 @@ def rk4_exponential(x: float) -> float:
 
 
 REST = 1.0 - rk4_exponential(1.0 / SLOW_SURFACE)
-
-
-def columns(kind: np.dtype, names: tuple[str, ...]) -> np.ndarray:
-    """Where fields of eight bytes lie in a record seen as numbers."""
-    return np.array([(kind.names or ()).index(name) for name in names])
-
-
-X = columns(STATE, STATES)
-MOVED = len(STATES)
-CHANGED = MOVED + 2  # roll and pitch too, corrected through the quaternion
-_E0, _E1, _E2, _E3 = (int(c) for c in columns(STATE, ("e0", "e1", "e2", "e3")))
 _Y = columns(MEASUREMENT, MEASURED[:11])
 _FELT = np.array([MEASURED.index(c) for c in ("ax", "ay", "az")])
-_PHI = int(columns(MEASUREMENT, ("phi",))[0])
 _SURFACE, _ASKED = columns(STATE, SURFACES), columns(COMMAND, SURFACES)
 _U, _V, _W, _P, _Q, _R = (int(c) for c in X[:6])
 _FLAP, _POWER_L, _POWER_R, _GUST_U, _ALTITUDE = (int(c) for c in columns(
@@ -108,9 +94,9 @@ def push(x: Any, state: Any, size: Any, half: Any) -> None:
     p, q, r = back if state == _P else 0.0, back if state == _Q else 0.0, back if state == _R else 0.0
     u, v, w = x[_U], x[_V], x[_W]
     x[_U], x[_V], x[_W] = u + r*v - q*w, v + p*w - r*u, w + q*u - p*v
-    e0, e1, e2, e3 = x[_E0], x[_E1], x[_E2], x[_E3]
-    x[_E0], x[_E1] = e0 - 0.5*(e1*p + e2*q + e3*r), e1 + 0.5*(e0*p + e2*r - e3*q)
-    x[_E2], x[_E3] = e2 + 0.5*(e0*q + e3*p - e1*r), e3 + 0.5*(e0*r + e1*q - e2*p)
+    e0, e1, e2, e3 = x[E0], x[E1], x[E2], x[E3]
+    x[E0], x[E1] = e0 - 0.5*(e1*p + e2*q + e3*r), e1 + 0.5*(e0*p + e2*r - e3*q)
+    x[E2], x[E3] = e2 + 0.5*(e0*q + e3*p - e1*r), e3 + 0.5*(e0*r + e1*q - e2*p)
 
 
 @kernel
@@ -120,22 +106,12 @@ def read(out: Any, x: Any, y: Any, p: Any) -> None:
         out[c] = y[_Y[c]]
     out[11] = (1.0 + p[_SCALE])*x[_ALTITUDE] + p[_BIAS] + p[_DRIFT]*y[_TIME]
     above = x[_ALTITUDE] - p[_ABOVE]
-    wind_u = ((p[_NORTH] + p[_NORTH_SHEAR]*above)*(x[_E0]**2 + x[_E1]**2 - x[_E2]**2 - x[_E3]**2)
-              + (p[_EAST] + p[_EAST_SHEAR]*above)*2.0*(x[_E1]*x[_E2] + x[_E0]*x[_E3])
-              + p[_DOWN]*2.0*(x[_E1]*x[_E3] - x[_E0]*x[_E2]))  # along body x
+    wind_u = ((p[_NORTH] + p[_NORTH_SHEAR]*above)*(x[E0]**2 + x[E1]**2 - x[E2]**2 - x[E3]**2)
+              + (p[_EAST] + p[_EAST_SHEAR]*above)*2.0*(x[E1]*x[E2] + x[E0]*x[E3])
+              + p[_DOWN]*2.0*(x[E1]*x[E3] - x[E0]*x[E2]))  # along body x
     per_power = p[_EFFICIENCY] / np.sqrt((x[_U] - wind_u - x[_GUST_U])**2 + p[_STATIC]**2)
     out[12] = p[_FACTOR_L] * x[_POWER_L] * per_power
     out[13] = p[_FACTOR_R] * x[_POWER_R] * per_power
-
-
-@kernel
-def turn(x: Any, phi: float, roll: float, pitch: float) -> None:
-    """Turn one row's attitude by small angles (rad): `roll` about body x, `pitch` about the horizontal y."""
-    wy, wz = pitch * np.cos(phi), -pitch * np.sin(phi)
-    e0, e1, e2, e3 = x[_E0], x[_E1], x[_E2], x[_E3]
-    turned = (e0 + 0.5 * (-e1 * roll - e2 * wy - e3 * wz), e1 + 0.5 * (e0 * roll + e2 * wz - e3 * wy),
-              e2 + 0.5 * (e0 * wy + e3 * roll - e1 * wz), e3 + 0.5 * (e0 * wz + e1 * wy - e2 * roll))
-    x[_E0], x[_E1], x[_E2], x[_E3] = turned
 
 
 @kernel
@@ -147,47 +123,6 @@ def sense(s: Any, m: Any, c: Any, p: Any, felt: tuple, dt: float) -> None:
     read_quietly(s, m, p)
     phi, theta, _psi = euler_angles(s.e0, s.e1, s.e2, s.e3)
     read_gyros_quietly(s, m, p, phi, theta)
-
-
-@kernel
-def miss(left: Any, measured: Any, stretch: Any, fed: Any, j: int) -> None:
-    """Turn one row's prediction `left` into measured less predicted, and put what corrects it into lane `j`."""
-    for c in range(len(left)):
-        left[c] = measured[c] - left[c]
-    for c in range(FED_BACK):
-        fed[c*LANES + j] = left[c]*stretch[c] if np.isfinite(measured[c]) else 0.0
-
-
-@kernel
-def gained(gain: Any, fed: Any, change: Any) -> None:
-    """Changes of a whole block's states by one gain [FED_BACK, CHANGED]; the same sums as `gained_by_one`."""
-    for s in range(CHANGED):
-        for j in range(LANES):
-            total = 0.0
-            for c in range(FED_BACK):
-                total += gain[c, s]*fed[c*LANES + j]
-            change[s*LANES + j] = total
-
-
-@kernel
-def gained_by_one(gain: Any, fed: Any, change: Any, j: int, scratch: Any) -> None:
-    """Changes of the states of lane `j` by its own gain."""
-    for s in range(CHANGED):
-        scratch[s] = 0.0
-    for c in range(FED_BACK):
-        share = fed[c*LANES + j]
-        for s in range(CHANGED):
-            scratch[s] += gain[c, s]*share
-    for s in range(CHANGED):
-        change[s*LANES + j] = scratch[s]
-
-
-@kernel
-def correct(x: Any, phi: float, change: Any, j: int) -> None:
-    """Move one row's states by what stands in lane `j`."""
-    for s in range(MOVED):
-        x[X[s]] += change[s*LANES + j]
-    turn(x, phi, change[MOVED*LANES + j], change[(MOVED + 1)*LANES + j])
 
 
 @kernel
@@ -279,19 +214,4 @@ def along(table: Any, controls: Any, first: Any, last: Any, measured: Any, stret
                 if at <= i < at + count:
                     out[k, i, error_at[j, 1]] += error[j, min(first[i] + k, last[i] - 1) + 1]
             if len(gain) > 0:
-                here, alike = min(first[at] + k, last[at] - 1), len(gain) == 1 and count == LANES
-                for j in range(count):
-                    i = at + j
-                    now = min(first[i] + k, last[i] - 1)
-                    miss(out[k, i], measured[now + 1], stretch[i], fed, j)
-                    alike = alike and now == here
-                if alike:
-                    gained(gain[0, min(here, gain.shape[1] - 1)], fed, change)
-                else:
-                    for j in range(count):
-                        i = at + j
-                        now = min(first[i] + k, last[i] - 1)
-                        gained_by_one(gain[i if len(gain) > 1 else 0, min(now, gain.shape[1] - 1)], fed, change, j,
-                                      scratch)
-                for j in range(count):
-                    correct(x[at + j], y[at + j, _PHI], change, j)
+                follow_record(x, y, out[k], at, count, k, first, last, measured, stretch, gain, fed, change, scratch)

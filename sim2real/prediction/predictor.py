@@ -23,7 +23,8 @@ from icing_env.parameters import PARAMETERS, copied
 from icing_env.record import FloatArray
 from icing_env.simulate import Fleet
 from icing_env.types import STATE
-from sim2real.prediction.along import CONTROLS, SLOW_SURFACE, STATES, STILL, X, along, columns, read, turn
+from sim2real.prediction.along import CONTROLS, SLOW_SURFACE, STILL, along, read
+from sim2real.prediction.correction import STATES, X, columns, turn
 from sim2real.records.channels import FED_BACK, MEASURED, SURFACES
 from sim2real.records.instruments import STEP
 from sim2real.records.reconstruct import Reconstruction

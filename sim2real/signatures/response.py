@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from icing_env.jit import entry
 from icing_env.record import FloatArray
-from sim2real.prediction.along import STATES
+from sim2real.prediction.correction import STATES
 from sim2real.prediction.kalman import Gain, linearise
 from sim2real.prediction.predictor import Push, seen
 from sim2real.records.channels import MEASURED
@@ -81,13 +81,18 @@ def _in_a_step(flight: Reconstruction, target: str, size: FloatArray) -> list[tu
     """What acts on a state through every step, put at its start [N]: of a turn, half is taken back (`along.push`)."""
     if target not in "pqr":
         return [(STATES.index(target), size)]
+    back = -0.5 * flight.dt * size
+    turns = flight.once("turns", lambda: _turns(flight))
+    return [(STATES.index(target), size), *((at, back * by) for at, by in turns[target])]
+
+
+def _turns(flight: Reconstruction) -> dict[str, list[tuple[int, float | FloatArray]]]:
+    """What turning about each body axis changes: (state, by how much for each rad) of every one, each sample [N]."""
     phi, theta, V, alpha, beta = (flight.channel(name) for name in ("phi", "theta", "airspeed", "alpha", "beta"))
-    u, v, w, back, roll = V * np.cos(alpha), V * beta, V * np.sin(alpha), -0.5 * flight.dt * size, len(STATES)
-    axes: dict[str, list[tuple[int, float | FloatArray]]] = {
-        "p": [(1, w), (2, -v), (roll, 1.0)],
-        "q": [(0, -w), (2, u), (roll, np.tan(theta) * np.sin(phi)), (roll + 1, np.cos(phi))],
-        "r": [(0, v), (1, -u), (roll, np.tan(theta) * np.cos(phi)), (roll + 1, -np.sin(phi))]}  # fmt: skip
-    return [(STATES.index(target), size), *((at, back * by) for at, by in axes[target])]
+    u, v, w, roll = V * np.cos(alpha), V * beta, V * np.sin(alpha), len(STATES)
+    return {"p": [(1, w), (2, -v), (roll, 1.0)],
+            "q": [(0, -w), (2, u), (roll, np.tan(theta) * np.sin(phi)), (roll + 1, np.cos(phi))],
+            "r": [(0, v), (1, -u), (roll, np.tan(theta) * np.cos(phi)), (roll + 1, -np.sin(phi))]}
 
 
 def _in_turn(pushes: Sequence[Push], rows: Sequence[int]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
