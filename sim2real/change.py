@@ -79,10 +79,10 @@ def changed(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
     progress("flying the records freely, before and after")
     left = flown_freely(flights, sigmas, alone, seed)
     change = with_own_numbers(alone, told.explained, told.flown, candidates.nuisances)
-    if any_aircraft and whole_model.suspected(posterior):
+    if any_aircraft and whole_model.suspected(posterior, baseline.precision):
         judged = _judged(flights, told, alone, change, left)
         all_of_it = (told.flown is None or bool(told.flown.values)) and not posterior.best.varies
-        if whole_model.incomplete(posterior, judged, all_of_it):
+        if whole_model.incomplete(posterior, baseline.precision, judged, all_of_it):
             whole = _whole(flights, candidates, posterior, told, sigmas, judged, seed, progress)
             if whole is not None:
                 return whole

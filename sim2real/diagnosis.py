@@ -21,7 +21,7 @@ from sim2real.closing import gap
 from sim2real.closing.remedy import Remedy, resimulation, values_of
 from sim2real.closing.whole_model import components_with
 from sim2real.ladder import ladder
-from sim2real.library.candidates import Bank, bank, not_testable
+from sim2real.library.candidates import SPREAD, Bank, bank, not_testable
 from sim2real.library.terms import in_common
 from sim2real.over_time.history import SAME, History, histories
 from sim2real.planning.limits import limits
@@ -94,12 +94,12 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     """
     began = time.perf_counter()
     at_hand = _at_hand(records, held_out, reference, tuple(without), simulator, progress)
-    flights, others, candidates, baseline = at_hand.flights, at_hand.others, at_hand.candidates, at_hand.baseline
+    flights, others, candidates = at_hand.flights, at_hand.others, at_hand.candidates
     untestable = not_testable(flights, candidates)
-    evidences, posterior = fit(flights, candidates, untestable, baseline, progress)
+    evidences, posterior, baseline = fit(flights, candidates, untestable, at_hand.baseline, progress)
     found = changed(flights, candidates, evidences, baseline, posterior, seed, not (reference or simulator), progress)
     posterior, explained = found.posterior, found.told.explained
-    sizes = _over_time(at_hand, evidences, found, progress)
+    sizes = _over_time(replace(at_hand, baseline=baseline), evidences, found, progress)
     progress("flying what these records could have revealed")
     shown = limits(evidences, candidates, baseline, posterior.tempering, posterior.fits)
     sigma = float(np.mean([e.sigma_w for e in evidences]))
@@ -127,7 +127,8 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         resimulate=resimulation(found.change, found.training, flights, evidences),
         data_problems=problems((*flights, *others)),
         provenance=provenance(flights, others, evidences, at_hand.without, len(reference), seed)
-        | {"tempering": posterior.tempering, "model": baseline.answer() if reference else None},
+        | {"tempering": posterior.tempering, "model": baseline.answer() if reference else None,
+           "spread": None if baseline.spread is None else baseline.spread * SPREAD},
         seconds=time.perf_counter() - began,
         details=Details(tuple(flights), tuple(others), tuple(evidences), posterior, found.change, found.training,
                         tested),

@@ -95,7 +95,7 @@ def search_on_nothing(flights: Sequence[Reconstruction], others: Sequence[Recons
                     for piece in synthetic(flight, sigma, seed + 2000 + start + 50 * i)]
                    for start, records in ((0, flights), (1000, others)))  # fmt: skip
     untestable = not_testable(made, candidates)
-    found, posterior = fit(made, candidates, untestable, baseline, lambda text: None)
+    found, posterior, _ = fit(made, candidates, untestable, baseline, lambda text: None)
     best = runner_up(posterior, None)
     change = _remedy_of(best, made, candidates, found, baseline, posterior)
     before, after = (float(np.sqrt(np.nanmean(gap.of_all(tests, what)))) for what in (Remedy(), change))

@@ -25,6 +25,7 @@ from sim2real.posterior.attribution import Linear, attribute, least_misfit, nuis
 from sim2real.posterior.generic import UnknownFit
 from sim2real.posterior.hypotheses import Hypothesis, Posterior, doubted, leaving_out, normalised
 from sim2real.posterior.singles import fit_family
+from sim2real.posterior.spread import likeliest
 from sim2real.prediction.kalman import Gain
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.courses import Course, Courses
@@ -35,12 +36,13 @@ RELINEARISE = 8.0  # whitened distance of the fitted nuisances beyond which all 
 AGAIN = 2  # times at most
 PLAIN, GUESSES = 20.0, 4  # log evidence by which an effect is plain to see, and how many of these are flown
 LOSES = 1.1  # times what the best explanation left, that it leaves with gains found with it: it lost the record
+ADEQUATE = 2.0  # times the noise that is left, up to which the model lacks no more than what is looked for (assumed)
 CALMER = 0.6  # ratio of temperings below which the leading explanations are flown again
 Progress = Callable[[str], None]
 
 
 def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[str, str], baseline: Baseline,
-        progress: Progress) -> tuple[list[Evidence], Posterior]:
+        progress: Progress) -> tuple[list[Evidence], Posterior, Baseline]:
     """Evidence and posterior, flown about the model that fits best without a gap, and where need be about a better one.
 
     Signatures are linear in the nuisances only nearby, and turbulence makes them large: derivatives that are off by
@@ -49,6 +51,9 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
 
     Args:
         untestable: effects left out, with the reason; those that these records do not show are added.
+
+    Returns:
+        Evidence of every record, the posterior, and the baseline with the spread that the records ask for.
     """
     progress("fitting the model's own uncertainty")
     flights, centre, known = followed(flights, candidates, baseline)
@@ -69,8 +74,8 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
         found.refine()
         found.refine_anew(progress)
     untestable |= found.quiet
-    posterior = varying(flights, candidates, found.evidences, baseline, found.posterior, found.centre)
-    return found.evidences, replace(posterior, hypotheses=doubted(normalised(posterior.hypotheses)))
+    posterior = varying(flights, candidates, found.evidences, found.baseline, found.posterior, found.centre)
+    return found.evidences, replace(posterior, hypotheses=doubted(normalised(posterior.hypotheses))), found.baseline
 
 
 def first_guess(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline, untestable: Iterable[str],
@@ -135,7 +140,7 @@ class _Weighing:
         self.evidences = flown
         self.along = [Course(e) for e in self.evidences]
         self.points, self.linear = {}, {}
-        self._weigh(tempering)
+        self._weigh(tempering, anew=True)
         return True
 
     def weigh_courses(self) -> None:
@@ -147,14 +152,28 @@ class _Weighing:
                         *wander_fits(wandering(self.flights, rows), left, t),
                         *late_fits(lateness(self.flights, rows), left, t)])
 
-    def _weigh(self, tempering: float | None, free: Sequence[UnknownFit] = ()) -> None:
-        self.quiet = dict(self.untestable)
-        linear = weigh(self.evidences, self.candidates, self.quiet, self.baseline, self.centre, self.linear,
-                       tempering, free)
+    def _weigh(self, tempering: float | None, free: Sequence[UnknownFit] = (), anew: bool = False) -> None:
+        """Weigh what was flown; `anew`: how uncertain derivatives are is judged too, where the model is adequate."""
+        linear = self._linear(tempering, free)
+        if anew and linear.tempering <= ADEQUATE:
+            t = linear.tempering
+            likely = likeliest(total(self.evidences) / t, self.candidates, self.baseline, self.centre, linear,
+                               lambda other: self._weighed(other, t, {}, dict(self.untestable)))  # fmt: skip
+            if likely is not self.baseline:
+                self.baseline, self.linear = likely, {}
+                linear = self._linear(tempering, free)
         if not self.points or linear.tempering != self.posterior.tempering:
             self.posterior = linear
             self.points = screen(self._flying(), self.start, linear, self.places)
         self.posterior = screened(linear, self.points, self.candidates.families)
+
+    def _linear(self, tempering: float | None, free: Sequence[UnknownFit]) -> Posterior:
+        self.quiet = dict(self.untestable)
+        return self._weighed(self.baseline, tempering, self.linear, self.quiet, free)
+
+    def _weighed(self, baseline: Baseline, tempering: float | None, kept: dict[float, Linear], quiet: dict[str, str],
+                 free: Sequence[UnknownFit] = ()) -> Posterior:  # fmt: skip
+        return weigh(self.evidences, self.candidates, quiet, baseline, self.centre, kept, tempering, free)
 
     def _gram(self) -> FloatArray:
         """Inner products of all records, tempered, the nuisances' prior among them."""

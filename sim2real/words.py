@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from sim2real.diagnosis import Diagnosis
+from sim2real.library.candidates import SPREAD
 from sim2real.library.terms import PURE_DELAY
 from sim2real.posterior.generic import COURSE
 
@@ -16,10 +17,15 @@ def sentences(found: Diagnosis) -> list[str]:
 
 
 def of_the_model(found: Diagnosis) -> str:
-    """What the reference flights said of the model with its numbers at their best; nothing without references."""
-    told = found.provenance["model"]
+    """What the reference flights said of the model with its numbers at their best, or how far off its numbers are.
+
+    Nothing where they are off as published ones are.
+    """
+    told, spread = found.provenance["model"], found.provenance.get("spread")
     if told is None:
-        return ""
+        return "" if not spread or spread <= SPREAD else (
+            f"The model's derivatives are off by about {100 * spread:.2g} % together, where published sets differ by "
+            f"{100 * SPREAD:.0f} %: a gap is what lies beyond that.")  # fmt: skip
     count, walk = found.provenance["references"], told["walk"]
     flights = "its reference flight is" if count == 1 else f"its {count} reference flights are"
     noise = "the process noise" if walk == 1.0 else f"{walk:g} times the process noise"

@@ -94,7 +94,7 @@ def test_what_stretches_the_model_is_not_all():
         where = None if settled is None else Settled(settled, np.ones_like(settled))
         best = Hypothesis(SetFit(), None, 0.0, 0.0, settled=where)
         found = Posterior((best,), {}, {}, np.zeros((1, 1)), tempering=tempering)
-        return whole_model.incomplete(found, left, all_of_it)
+        return whole_model.incomplete(found, np.eye(0 if settled is None else len(settled)), left, all_of_it)
 
     assert told(3.0, None) and not told(1.0, None)
     assert not told(1.0, np.ones(30)) and told(1.0, np.full(30, 1.8))

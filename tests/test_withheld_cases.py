@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from icing_env import record
+from testbed.benchmarks.diagnosis import kind_of
 from testbed.withheld import draw, effects, files, flights, generate, separation, strangers, unknown
 from testbed.withheld.manoeuvres import PLANS
 from testbed.withheld.published import airframe
@@ -179,7 +180,24 @@ def test_names_of_a_sealed_set_are_random_and_in_no_order(tmp_path, only_nulls):
         generate._roll(tmp_path / "a.json", 40, 3)
     with pytest.raises(ValueError, match="another seed"):  # nor as one of strangers
         generate._roll(tmp_path / "a.json", 40, None, strangers=True)
+    with pytest.raises(ValueError, match="or spread"):
+        generate._roll(tmp_path / "a.json", 40, None, spread=0.08)
     assert len(generate._roll(tmp_path / "c.json", 40, None, strangers=True)[0]) == 40
+
+
+def test_derivatives_of_another_spread_are_off_by_as_many_deviations():
+    case = draw.designs(8, 3)[0]
+    wide = draw.wider(case, 2.0 * draw.SPREAD)
+    assert draw.wider(case, draw.SPREAD) is case
+    assert wide.baseline["mass"] == case.baseline["mass"]
+    for name in draw.DERIVATIVES:
+        assert wide.baseline[name] - 1.0 == pytest.approx(2.0 * (case.baseline[name] - 1.0))
+
+
+def test_a_set_of_another_spread_says_so(tmp_path, only_nulls):
+    sealed = generate.generate(tmp_path, 3, 11, spread=0.08)
+    assert sealed["spread"] == 0.08 and kind_of(sealed) == "development spread 0.08"
+    assert "spread" not in generate.generate(tmp_path / "published", 3, 11)
 
 
 def test_an_interrupted_draw_goes_on_and_tampering_is_told(tmp_path, only_nulls):

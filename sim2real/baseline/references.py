@@ -45,7 +45,9 @@ class Baseline:
     """The model a gap is looked for against: its PARAMETERS row and the precision of its nuisances [n, n].
 
     `changes`: what is added to PARAMETERS per unit of (65 m/s / V)^2 - 1, by name; `inadequacy`: what is
-    left then; `clean`: what generic terms explain of the references all the same, log evidence by component.
+    left then; `clean`: what generic terms explain of the references all the same, log evidence by component;
+    `spread`: how many times the published spread its derivatives are uncertain by (`posterior.spread`); None where
+    reference flights say how well they are known.
     """
 
     parameters: NDArray
@@ -53,6 +55,7 @@ class Baseline:
     changes: dict[str, float] = field(default_factory=dict)
     inadequacy: Inadequacy = field(default_factory=Inadequacy)
     clean: dict[str, float] = field(default_factory=dict)
+    spread: float | None = 1.0
 
     def near(self, record: FlightRecord) -> NDArray:
         """PARAMETERS row at the record's median airspeed."""
@@ -194,4 +197,4 @@ def _baseline(candidates: Bank, moves: Sequence[Nuisance], x: FloatArray, precis
         if nuisance.name in FIXED:
             out[j], out[:, j] = 0.0, 0.0
             out[j, j] = 1.0
-    return Baseline(_possible(row), 0.5 * (out + out.T), changes)
+    return Baseline(_possible(row), 0.5 * (out + out.T), changes, spread=None)

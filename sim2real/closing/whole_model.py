@@ -92,29 +92,33 @@ class _Number:
     family: Family | None
 
 
-def suspected(posterior: Posterior) -> bool:
-    """Whether the best explanation leaves many times the noise, or may take numbers along that are too far off."""
-    return posterior.tempering > ANOTHER or _stretched(posterior)
+def suspected(posterior: Posterior, precision: FloatArray) -> bool:
+    """Whether the best explanation leaves many times the noise, or may take numbers along that are too far off.
+
+    `precision`: of the numbers' prior.
+    """
+    return posterior.tempering > ANOTHER or _stretched(posterior, precision)
 
 
-def incomplete(posterior: Posterior, flown: gap.Energy, all_of_it: bool) -> bool:
+def incomplete(posterior: Posterior, precision: FloatArray, flown: gap.Energy, all_of_it: bool) -> bool:
     """Whether a suspected explanation is not all: numbers too far off, or much left in free flight where noise is left.
 
     Args:
+        precision: of the numbers' prior.
         flown: the records in free flight, with that explanation; what only stretches the model leaves a gap there too.
             What is told of the noise is told without its form in terms, which may be all that there was left.
         all_of_it: whether all of the explanation flew; what did not leaves a gap there for that reason alone.
     """
     left = gap.g(flown.after, flown.alone) >= gap.null_quantile(flown.alone)
     if posterior.tempering > ANOTHER:
-        return left or not all_of_it or posterior.settled is None or _stretched(posterior)
-    return left and all_of_it and _stretched(posterior)
+        return left or not all_of_it or posterior.settled is None or _stretched(posterior, precision)
+    return left and all_of_it and _stretched(posterior, precision)
 
 
-def _stretched(posterior: Posterior) -> bool:
+def _stretched(posterior: Posterior, precision: FloatArray) -> bool:
     """Whether the numbers that go with the best explanation are farther from published ones than any aircraft's."""
     settled = posterior.settled
-    return settled is not None and float(settled @ settled) > chi2.isf(STRETCHED, len(settled))
+    return settled is not None and float(settled @ precision @ settled) > chi2.isf(STRETCHED, len(settled))
 
 
 def takes_most(before: gap.Energy, fitted: gap.Energy) -> bool:

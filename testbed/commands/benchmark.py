@@ -50,12 +50,14 @@ icing benchmark diagnosis --jsbsim"""
 @click.option("--without", is_flag=True, help="diagnosis: also each effect in turn left out of the library.")
 @click.option("--rivals", is_flag=True, help="diagnosis: diagnoses of other kinds answer too, as baselines.")
 @click.option("--strangers", is_flag=True, help="diagnosis: only effects that nobody had in mind; 40 if not told.")
+@click.option("--spread", type=click.FloatRange(min=0.0, max=0.3), default=0.05, show_default=True,
+              help="diagnosis: of the aircraft's derivatives about the published ones, one standard deviation.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True,
               help="diagnosis, recordings: processes.")
 def command(name: str, quick: bool, weights: Path | None, figure: Path | None, encounters: int | None,
             only: str | None, cases: int | None, fresh_seed: bool, out: Path, ledger: Path | None, workers: int,
-            without: bool, rivals: bool, strangers: bool, pool: tuple[Path, ...], publish: Path | None, jsbsim: bool,
-            jsbsim_root: str | None, as_json: bool, seed: int) -> None:
+            without: bool, rivals: bool, strangers: bool, spread: float, pool: tuple[Path, ...], publish: Path | None,
+            jsbsim: bool, jsbsim_root: str | None, as_json: bool, seed: int) -> None:
     """Measure the testbed.
 
     `speed`: one aircraft and batches, with and without observer, one thread, beside JSBSim in the same run (if it is
@@ -95,7 +97,7 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
 
         _diagnosis(cases or (STRANGERS if strangers else QUICK if quick else FULL), None if fresh_seed else seed,
                    out / "strangers" if strangers else out, workers, as_json, without=without, rivals=rivals,
-                   ledger=ledger, published=publish, strangers=strangers)
+                   ledger=ledger, published=publish, strangers=strangers, spread=spread)
         return
     if name in ("real_flight", "policies"):
         _cases(name, only, as_json)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -132,6 +132,13 @@ def _target(rng: np.random.Generator) -> float:
     """A third within 5 to 8, the rest beyond, evenly in the logarithm."""
     low, high = (5.0, 8.0) if rng.random() < 1.0 / 3.0 else (8.0, 80.0)
     return float(low * (high / low) ** rng.random())
+
+
+def wider(design: Design, spread: float) -> Design:
+    """The same case with derivatives that are off by as many deviations of another spread."""
+    off = {name: 1.0 + (factor - 1.0) * spread / SPREAD if name in DERIVATIVES else factor
+           for name, factor in design.baseline.items()}  # fmt: skip
+    return design if spread == SPREAD else replace(design, baseline=off)
 
 
 def published_spread(rng: np.random.Generator) -> dict[str, float]:

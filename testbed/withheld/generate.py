@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from testbed.withheld import files, published
-from testbed.withheld.draw import Design, designs, stranger_designs
+from testbed.withheld.draw import SPREAD, Design, designs, stranger_designs, wider
 from testbed.withheld.faults import excused, fault_count, fault_designs, spoiled
 from testbed.withheld.flights import CATALOGUE, Aircraft, recorded
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
@@ -36,7 +36,8 @@ T = TypeVar("T")
 
 
 def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
-             progress: Callable[[str], None] = lambda text: None, strangers: bool = False) -> dict[str, Any]:
+             progress: Callable[[str], None] = lambda text: None, strangers: bool = False,
+             spread: float = SPREAD) -> dict[str, Any]:  # fmt: skip
     """Make (or finish, or draw again beside its keys) a sealed set in `out`: `records/`, `keys/`, `manifest.json`.
 
     Args:
@@ -46,6 +47,7 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
         workers: processes.
         progress: told after every group of cases.
         strangers: of effects of the second list alone (`strangers.py`), without faults.
+        spread: of derivatives; distances in keys are those of SPREAD all the same.
 
     Returns:
         The manifest.
@@ -56,8 +58,9 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
     records, keys = out / "records", out / "keys"
     for folder in (records, keys):
         folder.mkdir(parents=True, exist_ok=True)
-    names, seed, known = _roll(keys / "seed.json", cases, seed, strangers)
+    names, seed, known = _roll(keys / "seed.json", cases, seed, strangers, spread)
     drawn = stranger_designs(cases, seed) if strangers else [*designs(cases, seed), *fault_designs(cases, seed)]
+    drawn = [wider(design, spread) for design in drawn]
     jobs = [(name, design) for name, design in zip(names, drawn, strict=True)
             if not ((records / name).is_dir() and (keys / f"{name}.json").is_file())]
     groups = [list(group) for _, group in groupby(sorted(jobs, key=lambda job: bank_of(job[1])),
@@ -74,20 +77,23 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
                 progress(f"flown {done} of {len(drawn)}")
     sealed = files.manifest(records, keys, names) | {
         "numbers": published.digest(), "count": cases, "development_seed": seed if known else None} | (
-        {"strangers": True} if strangers else {})
+        {"strangers": True} if strangers else {}) | ({"spread": spread} if spread != SPREAD else {})
     if (out / "manifest.json").is_file() and files.read_json(out / "manifest.json") != sealed:
         raise ValueError(f"{out}: what was drawn is not what its manifest tells: another generator, or other versions")
     files.write_text(out / "manifest.json", json.dumps(sealed, indent=1))
     return sealed
 
 
-def _roll(path: Path, cases: int, seed: int | None, strangers: bool = False) -> tuple[list[str], int, bool]:
+def _roll(path: Path, cases: int, seed: int | None, strangers: bool = False, spread: float = SPREAD
+          ) -> tuple[list[str], int, bool]:  # fmt: skip
     """Names and seed of the set and whether it was given; kept with the keys: an interrupted draw goes on as begun."""
     if path.is_file():
         kept = files.read_json(path)
-        wanted = (cases, seed is not None, kept["seed"] if seed is None else seed, strangers)
-        if (kept["cases"], kept["given"], kept["seed"], kept.get("strangers", False)) != wanted:
-            raise ValueError(f"{path.parent.parent} holds a set of {kept['cases']} cases with another seed or number")
+        wanted = (cases, seed is not None, kept["seed"] if seed is None else seed, strangers, spread)
+        there = (kept["cases"], kept["given"], kept["seed"], kept.get("strangers", False), kept.get("spread", SPREAD))
+        if there != wanted:
+            raise ValueError(f"{path.parent.parent} holds a set of {kept['cases']} cases with another seed, number or "
+                             "spread")
         return kept["names"], kept["seed"], kept["given"]
     given = seed is not None
     seed = seed if seed is not None else secrets.randbits(120)
@@ -98,7 +104,7 @@ def _roll(path: Path, cases: int, seed: int | None, strangers: bool = False) -> 
         if name not in names:
             names.append(name)
     files.write_text(path, json.dumps({"cases": cases, "seed": seed, "given": given, "names": names,
-                                      "strangers": strangers}))
+                                      "strangers": strangers, "spread": spread}))
     return names, seed, given
 
 
