@@ -17,6 +17,8 @@ from sim2real.posterior.hypotheses import Hypothesis, Posterior, normalised
 from sim2real.posterior.sets import SetFit
 from sim2real.posterior.spread import SPREADS, likeliest, of_spread
 from sim2real.words import of_the_model
+from testbed.benchmarks.diagnosis import solve
+from testbed.withheld import draw, files, generate
 
 KNOWN = replace(bank(), families=(), terms=())
 N = len(KNOWN.nuisances)
@@ -80,3 +82,14 @@ def test_a_wider_spread_is_said():
         "The model's derivatives are off by about 10 % together, where published sets differ by 5 %: "
         "a gap is what lies beyond that.")  # fmt: skip
     assert of_the_model(found(SPREAD)) == of_the_model(found(None)) == ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("which", [6, 8, 13])  # at 0, 1.5 and 0.5 m/s; each was a side force or an aileron's power
+def test_an_aircraft_whose_derivatives_are_off_by_more_has_no_gap(tmp_path, which):
+    nulls = [design for design in draw.designs(96, 770077) if design.tier == "null"]
+    texts, _ = generate.make_case("clean", draw.wider(nulls[which], 0.08), None)
+    files.write_case(tmp_path / "clean", texts)
+    found = solve(tmp_path / "clean")
+    assert found["verdict"] == "no_gap"
+    assert found["provenance"]["spread"] > SPREAD
