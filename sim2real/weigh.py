@@ -109,14 +109,16 @@ def first_guess(flights: Sequence[Reconstruction], candidates: Bank, baseline: B
 class _Weighing:
     """Evidence of some records about a model moved by `centre` [n] nuisances, and what it says so far.
 
-    known: gains of the best explanation, once it has been flown; quiet: effects that these records do not show.
+    known: gains of the best explanation, once it has been flown; quiet: effects that these records do not show;
+    published: the baseline before its spread was judged.
     """
 
     posterior: Posterior
 
     def __init__(self, flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline,
                  untestable: dict[str, str], centre: FloatArray) -> None:
-        self.flights, self.candidates, self.baseline = flights, candidates, baseline
+        self.flights, self.candidates = flights, candidates
+        self.published = self.baseline = baseline
         self.untestable, self.centre = dict(untestable), centre
         self.known: list[Gain] | None = None
         self.quiet = dict(untestable)
@@ -154,6 +156,8 @@ class _Weighing:
 
     def _weigh(self, tempering: float | None, free: Sequence[UnknownFit] = (), anew: bool = False) -> None:
         """Weigh what was flown; `anew`: how uncertain derivatives are is judged too, where the model is adequate."""
+        if anew:
+            self.baseline = self.published
         linear = self._linear(tempering, free)
         if anew and linear.tempering <= ADEQUATE:
             t = linear.tempering

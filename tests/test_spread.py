@@ -33,6 +33,12 @@ def products(numbers: np.ndarray) -> np.ndarray:
     return rows.T @ rows
 
 
+def test_a_gap_that_is_there_with_a_wider_spread_too_keeps_the_published_one():
+    numbers = 2.0 * np.random.default_rng(1).standard_normal(N)
+    assert spread_of(numbers, told(gap=3.0), told(gap=2.0)) == 1.0
+    assert spread_of(numbers, told(gap=3.0), told(gap=-2.0)) > 1.0
+
+
 def told(gap: float = -20.0) -> Posterior:
     """No gap, and one effect whose evidence over that is `gap`."""
     found = [Hypothesis(SetFit(), None, np.log(0.5), 0.0), Hypothesis(one("lift_slope"), None, np.log(0.5), gap)]

@@ -3,7 +3,8 @@
 The published spread of derivatives is itself a guess. Where it is too small, numbers that are off as a whole look like
 a gap in whichever number is off most. Evidence decides between a few multiples, all explanations counted (type II
 maximum likelihood: MacKay, Neural Computation 4(3), 1992): one number that is far off is an effect, for the others pay
-for a wider prior of all; thirty that are off by half as much again are that.
+for a wider prior of all; thirty that are off by half as much again are that. Where there is a gap even so, the
+published spread stays: what an explanation leaves, another form or a response that bends, would pass for numbers off.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ WORTH_WEIGHING = 20.0  # log evidence that explanations may add to what no gap s
 
 def likeliest(gram: FloatArray, candidates: Bank, baseline: Baseline, centre: FloatArray, before: Posterior,
               weighed: Callable[[Baseline], Posterior]) -> Baseline:  # fmt: skip
-    """The baseline with the spread that explains the records best; as it is where reference flights told it.
+    """The baseline with the spread that explains the records best, if there is no gap then.
+
+    As it is where reference flights told it.
 
     Args:
         gram: inner products of all records, tempered, without a prior.
@@ -37,13 +40,12 @@ def likeliest(gram: FloatArray, candidates: Bank, baseline: Baseline, centre: Fl
     if baseline.spread is None:
         return baseline
     best, most = baseline, _evidence(gram, candidates, baseline, centre, before)
-    for spread in SPREADS:
-        if spread == baseline.spread:
-            continue
+    for spread in sorted(SPREADS.keys() - {baseline.spread}):
         other = of_spread(baseline, candidates, spread)
         if _nothing(gram, candidates, other, centre) + WORTH_WEIGHING > most:
-            told = _evidence(gram, candidates, other, centre, weighed(other))
-            if told > most:
+            posterior = weighed(other)
+            told = _evidence(gram, candidates, other, centre, posterior)
+            if told > most and posterior.none > 0.5:
                 best, most = other, told
     return best
 
