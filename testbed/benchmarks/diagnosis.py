@@ -116,8 +116,8 @@ def untouched(out: Path, committed: Mapping[str, Any], published: Path | None = 
 def kind_of(committed: Mapping[str, Any]) -> str:
     """What kind of set a manifest is of: its seed the operating system's, or one that is known; and what it draws."""
     seed = "sealed" if committed["development_seed"] is None else "development"
-    drawn = [f"spread {committed['spread']:g}"] * ("spread" in committed) + ["strangers"] * ("strangers" in committed)
-    return " ".join([seed, *drawn])
+    spread = f" spread {committed['spread']:g}" if "spread" in committed else ""
+    return seed + spread + (" strangers" if "strangers" in committed else "")
 
 
 def removals(keys: Path) -> dict[str, str]:
