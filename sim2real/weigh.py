@@ -11,6 +11,7 @@ from icing_env.record import FloatArray
 from sim2real.actuators.lateness import lateness
 from sim2real.actuators.wandering import wandering
 from sim2real.baseline.references import Baseline
+from sim2real.baseline.spread import likeliest
 from sim2real.flown.companions import leading
 from sim2real.flown.points import Flying
 from sim2real.flown.refine import refine
@@ -25,7 +26,6 @@ from sim2real.posterior.attribution import Linear, attribute, least_misfit, nuis
 from sim2real.posterior.generic import UnknownFit
 from sim2real.posterior.hypotheses import Hypothesis, Posterior, doubted, leaving_out, normalised
 from sim2real.posterior.singles import fit_family
-from sim2real.posterior.spread import likeliest
 from sim2real.prediction.kalman import Gain
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.courses import Course, Courses

@@ -12,10 +12,10 @@ from test_devices import one
 from icing_env.aircraft import load
 from icing_env.types import DERIVATIVE_NAMES
 from sim2real.baseline.references import Baseline
+from sim2real.baseline.spread import SPREADS, likeliest, of_spread
 from sim2real.library.candidates import NUISANCE_STEP, SPREAD, bank
 from sim2real.posterior.hypotheses import Hypothesis, Posterior, normalised
 from sim2real.posterior.sets import SetFit
-from sim2real.posterior.spread import SPREADS, likeliest, of_spread
 from sim2real.words import of_the_model
 from testbed.benchmarks.diagnosis import solve
 from testbed.withheld import draw, files, generate

@@ -46,7 +46,7 @@ class Baseline:
 
     `changes`: what is added to PARAMETERS per unit of (65 m/s / V)^2 - 1, by name; `inadequacy`: what is
     left then; `clean`: what generic terms explain of the references all the same, log evidence by component;
-    `spread`: how many times the published spread its derivatives are uncertain by (`posterior.spread`); None where
+    `spread`: how many times the published spread its derivatives are uncertain by (`baseline.spread`); None where
     reference flights say how well they are known.
     """
 
