@@ -61,18 +61,11 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
     guess = first_guess(flights, candidates, baseline, untestable, centre, known)
     progress(f"flying {candidates.size} variants along {len(flights)} records")
     found.gather(guess)
-    for _ in range(AGAIN):
-        if not found.judged():
-            break
-        progress("flying the variants again, gusts judged with the best explanation")
-        if not found.gather(found.known):
-            break
-    progress("looking for what no generic term follows")
-    found.weigh_courses()
-    if leading(found.posterior):
-        progress("flying the leading explanations where they were fitted")
-        found.refine()
-        found.refine_anew(progress)
+    found.explain(progress)
+    if found.baseline is not found.published and found.posterior.none <= 0.5:  # flown, it is a gap after all
+        progress("weighing again with the published spread")
+        found.as_published()
+        found.explain(progress)
     untestable |= found.quiet
     posterior = varying(flights, candidates, found.evidences, found.baseline, found.posterior, found.centre)
     return found.evidences, replace(posterior, hypotheses=doubted(normalised(posterior.hypotheses))), found.baseline
@@ -110,7 +103,7 @@ class _Weighing:
     """Evidence of some records about a model moved by `centre` [n] nuisances, and what it says so far.
 
     known: gains of the best explanation, once it has been flown; quiet: effects that these records do not show;
-    published: the baseline before its spread was judged.
+    published: the baseline before its spread was judged; wider: whether that may be wider.
     """
 
     posterior: Posterior
@@ -119,6 +112,7 @@ class _Weighing:
                  untestable: dict[str, str], centre: FloatArray) -> None:
         self.flights, self.candidates = flights, candidates
         self.published = self.baseline = baseline
+        self.wider = True
         self.untestable, self.centre = dict(untestable), centre
         self.known: list[Gain] | None = None
         self.quiet = dict(untestable)
@@ -145,6 +139,27 @@ class _Weighing:
         self._weigh(tempering, anew=True)
         return True
 
+    def as_published(self) -> None:
+        """Weigh what was flown with the published spread, and judge it no more."""
+        self.wider = False
+        self.baseline, self.points, self.linear = self.published, {}, {}
+        self._weigh(None)
+
+    def explain(self, progress: Progress) -> None:
+        """Fly the variants again with gains of the best explanation, where that is worth it, and the leading ones."""
+        for _ in range(AGAIN):
+            if not self.judged():
+                break
+            progress("flying the variants again, gusts judged with the best explanation")
+            if not self.gather(self.known):
+                break
+        progress("looking for what no generic term follows")
+        self.weigh_courses()
+        if leading(self.posterior):
+            progress("flying the leading explanations where they were fitted")
+            self.refine()
+            self.refine_anew(progress)
+
     def weigh_courses(self) -> None:
         """Weigh once more, free courses of time among what is unknown."""
         t, first = self.posterior.tempering, 1 + len(self.candidates.nuisances)
@@ -159,7 +174,7 @@ class _Weighing:
         if anew:
             self.baseline = self.published
         linear = self._linear(tempering, free)
-        if anew and linear.tempering <= ADEQUATE:
+        if anew and self.wider and linear.tempering <= ADEQUATE:
             t = linear.tempering
             likely = likeliest(total(self.evidences) / t, self.candidates, self.baseline, self.centre, linear,
                                lambda other: self._weighed(other, t, {}, dict(self.untestable)))  # fmt: skip
