@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,21 +11,21 @@ from icing_env.record import FloatArray
 from sim2real.actuators.lateness import lateness
 from sim2real.actuators.wandering import wandering
 from sim2real.baseline.references import Baseline
-from sim2real.baseline.spread import likeliest
+from sim2real.baseline.spread import likeliest, of_spread, spread_beside
 from sim2real.flown.companions import leading
+from sim2real.flown.first_guess import first_guess
 from sim2real.flown.points import Flying
 from sim2real.flown.refine import refine
 from sim2real.flown.screen import Points, screen, screened
-from sim2real.flown.settling import departs, differ, followed, gains_with, gather_about, length, model_alone, nearer
+from sim2real.flown.settling import departs, differ, followed, gains_with, gather_about, length, nearer
 from sim2real.flown.steps import FARTHEST, Places
-from sim2real.library.candidates import Bank, at_few_sizes
+from sim2real.library.candidates import Bank
 from sim2real.over_time.varying import varying
 from sim2real.posterior.any_course import course_fits, wander_fits
 from sim2real.posterior.any_delay import late_fits
-from sim2real.posterior.attribution import Linear, attribute, least_misfit, nuisance_mean, of_one, reduce, with_prior
+from sim2real.posterior.attribution import Linear, attribute, least_misfit, nuisance_mean, with_prior
 from sim2real.posterior.generic import UnknownFit
 from sim2real.posterior.hypotheses import Hypothesis, Posterior, doubted, leaving_out, normalised
-from sim2real.posterior.singles import fit_family
 from sim2real.prediction.kalman import Gain
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.courses import Course, Courses
@@ -34,7 +34,6 @@ from sim2real.signatures.tempering import noise, temper, total
 
 RELINEARISE = 8.0  # whitened distance of the fitted nuisances beyond which all is flown again about them
 AGAIN = 2  # times at most
-PLAIN, GUESSES = 20.0, 4  # log evidence by which an effect is plain to see, and how many of these are flown
 LOSES = 1.1  # times what the best explanation left, that it leaves with gains found with it: it lost the record
 ADEQUATE = 2.0  # times the noise that is left, up to which the model lacks no more than what is looked for (assumed)
 CALMER = 0.6  # ratio of temperings below which the leading explanations are flown again
@@ -62,48 +61,18 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
     progress(f"flying {candidates.size} variants along {len(flights)} records")
     found.gather(guess)
     found.explain(progress)
-    if found.baseline is not found.published and found.posterior.none <= 0.5:  # flown, it is a gap after all
-        progress("weighing again with the published spread")
-        found.as_published()
-        found.explain(progress)
+    found.judge_spread(progress)
     untestable |= found.quiet
     posterior = varying(flights, candidates, found.evidences, found.baseline, found.posterior, found.centre)
     return found.evidences, replace(posterior, hypotheses=doubted(normalised(posterior.hypotheses))), found.baseline
-
-
-def first_guess(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline, untestable: Iterable[str],
-                centre: FloatArray, known: list[Gain]) -> list[Gain]:  # fmt: skip
-    """Gains with the likeliest single effect in the model, if one is plain to see; else those known.
-
-    A gap passes for gust. What all variants would have to be flown again for is seen with a few of them.
-    """
-    few = at_few_sizes(candidates, untestable)
-    evidences = gather_about(flights, few, centre, known)
-    gram = with_prior(total(evidences), few, baseline.precision, centre)
-    reduced = reduce(gram, few, np.zeros_like(baseline.precision))
-    tempering = max(temper(float(reduced[0, 0]), evidences), 1.0)
-    gram = with_prior(total(evidences) / tempering, few, baseline.precision, centre)
-    reduced = reduce(gram, few, np.zeros_like(baseline.precision))
-    fits = sorted((fit_family(reduced, f) for f in few.families), key=lambda fit: -fit.log_evidence)[:GUESSES]
-    if not fits or fits[0].log_evidence < PLAIN:
-        return known
-    courses = Courses([Course(e) for e in evidences], tempering, few.terms)
-    flying = Flying(flights, few, evidences, baseline, tempering, courses)
-    alone = [of_one(fit) for fit in fits if fit.log_evidence > PLAIN]
-    starts = [np.clip(centre + nuisance_mean(gram, few, fit.weights or {}), -FARTHEST, FARTHEST) for fit in alone]
-    points = flying.descended(alone, starts)
-    best = min(range(len(points)), key=lambda i: points[i].cost)
-    point = points[best]
-    fit = replace(alone[best], estimate=tuple(point.sizes))
-    found = gains_with(flying, Hypothesis(fit, None, 0.0, 0.0), point.nuisances, 1)
-    return known if departs(model_alone(flights, few, centre, found)) else found
 
 
 class _Weighing:
     """Evidence of some records about a model moved by `centre` [n] nuisances, and what it says so far.
 
     known: gains of the best explanation, once it has been flown; quiet: effects that these records do not show;
-    published: the baseline before its spread was judged; wider: whether that may be wider.
+    published: the baseline as it was given; assumed: that with the spread that weighing begins with; wider: whether
+    it may be wider still.
     """
 
     posterior: Posterior
@@ -111,7 +80,7 @@ class _Weighing:
     def __init__(self, flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline,
                  untestable: dict[str, str], centre: FloatArray) -> None:
         self.flights, self.candidates = flights, candidates
-        self.published = self.baseline = baseline
+        self.published = self.assumed = self.baseline = baseline
         self.wider = True
         self.untestable, self.centre = dict(untestable), centre
         self.known: list[Gain] | None = None
@@ -139,11 +108,42 @@ class _Weighing:
         self._weigh(tempering, anew=True)
         return True
 
-    def as_published(self) -> None:
-        """Weigh what was flown with the published spread, and judge it no more."""
-        self.wider = False
-        self.baseline, self.points, self.linear = self.published, {}, {}
+    def judge_spread(self, progress: Progress) -> None:
+        """Judge how uncertain derivatives are with the best explanation flown, and explain with that what was flown.
+
+        A wider spread that was taken for no gap, where one was found all the same, is not believed. Nor is one that the
+        numbers no longer ask for which settle with it.
+        """
+        if self.posterior.none <= 0.5 and self.baseline is not self.published:
+            self._explain_with(self.published, progress)
+        if self.posterior.none > 0.5 or self.published.spread is None:
+            return
+        if (spread := self._asked()) > self.published.spread:
+            before = dict(vars(self))
+            self._explain_with(of_spread(self.published, self.candidates, spread), progress)
+            if self.posterior.none <= 0.5 and self._asked() <= self.published.spread:
+                vars(self).update(before)
+
+    def _asked(self) -> float:
+        """The spread that the numbers ask for which settled beside the best explanation, if that is all there is.
+
+        What it lacks would pass for numbers that are off: another form, where it gains by that, or something else that
+        a number went as far for as it may.
+        """
+        best = self.posterior.best
+        if best.unknown is not None or best.varies or best.settled is None or self.posterior.tempering > ADEQUATE:
+            return 1.0
+        at_end = np.abs(best.settled.nuisances) > FARTHEST - 1e-9
+        lacks = best.regained > 0.0 or bool(at_end.any())
+        return 1.0 if lacks else spread_beside(best.settled, self.candidates, self.baseline)
+
+    def _explain_with(self, baseline: Baseline, progress: Progress) -> None:
+        """Weigh what was flown with the spread of a baseline, judge it no more, and fly the leading explanations."""
+        progress("weighing again with another spread of the derivatives")
+        self.wider, self.assumed = False, baseline
+        self.baseline, self.points, self.linear = baseline, {}, {}
         self._weigh(None)
+        self.explain(progress)
 
     def explain(self, progress: Progress) -> None:
         """Fly the variants again with gains of the best explanation, where that is worth it, and the leading ones."""
@@ -172,7 +172,7 @@ class _Weighing:
     def _weigh(self, tempering: float | None, free: Sequence[UnknownFit] = (), anew: bool = False) -> None:
         """Weigh what was flown; `anew`: how uncertain derivatives are is judged too, where the model is adequate."""
         if anew:
-            self.baseline = self.published
+            self.baseline = self.assumed
         linear = self._linear(tempering, free)
         if anew and self.wider and linear.tempering <= ADEQUATE:
             t = linear.tempering

@@ -36,7 +36,7 @@ def test_numbers_change_each_by_its_share_and_neutral_ones_not_a_bit():
 def test_what_settled_is_flown_as_the_diagnosis_flew_it():
     moves = nuisances()
     sizes = np.random.default_rng(0).normal(size=len(moves))
-    found = own_numbers(Settled(sizes, np.full(len(moves), 0.5)), moves)
+    found = own_numbers(Settled(sizes, np.diag(np.full(len(moves), 0.25))), moves)
     row = load()
     there = shifted(row, moves, sizes, "torque")
     for name in NUMBERS:
@@ -46,7 +46,7 @@ def test_what_settled_is_flown_as_the_diagnosis_flew_it():
 
 def test_nothing_settles_beside_what_is_not_flown():
     moves = nuisances()
-    settled = Settled(np.ones(len(moves)), np.ones(len(moves)))
+    settled = Settled(np.ones(len(moves)), np.eye(len(moves)))
     flown, not_flown = (Hypothesis(SetFit(), None, 0.0, 0.0, settled=at) for at in (settled, None))
     effect = Remedy({"pitch_trim": {"delta_Cm_0": 0.01}})
     assert with_own_numbers(effect, flown, None, moves).values["pitch_trim"] == {"delta_Cm_0": 0.01}

@@ -7,14 +7,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from test_devices import one
 
 from icing_env.aircraft import load
 from icing_env.types import DERIVATIVE_NAMES
 from sim2real.baseline.references import Baseline
-from sim2real.baseline.spread import SPREADS, likeliest, of_spread
+from sim2real.baseline.spread import SPREADS, likeliest, of_spread, spread_beside
 from sim2real.library.candidates import NUISANCE_STEP, SPREAD, bank
-from sim2real.posterior.hypotheses import Hypothesis, Posterior, normalised
+from sim2real.posterior.hypotheses import Hypothesis, Posterior, Settled, normalised
 from sim2real.posterior.sets import SetFit
 from sim2real.words import of_the_model
 from testbed.benchmarks.diagnosis import solve
@@ -62,6 +64,36 @@ def test_one_number_that_is_far_off_is_no_spread():
     assert spread_of(numbers, told(), told()) > 1.0  # none does
 
 
+def settled(numbers: np.ndarray, baseline: Baseline = BASELINE, shown: float = SHOWN) -> Settled:
+    """Where numbers settle [N] that records show so well, each by itself, beside an explanation."""
+    covariance = np.linalg.inv(shown**2 * np.eye(N) + baseline.precision)
+    return Settled(shown**2 * covariance @ numbers, covariance)
+
+
+@pytest.mark.parametrize(("size", "right", "least"), [(1.0, {1.0}, 95), (1.6, {1.5, 2.0}, 80), (2.0, {1.5, 2.0}, 97)])
+def test_the_spread_is_that_of_the_numbers_beside_an_explanation(size, right, least):
+    rng = np.random.default_rng(1)
+    numbers = np.where(DERIVATIVES, size, 1.0) * rng.standard_normal((100, N))
+    assert sum(spread_beside(settled(own), KNOWN, BASELINE) in right for own in numbers) >= least
+
+
+def test_numbers_that_records_hardly_show_ask_for_nothing():
+    assert spread_beside(settled(np.where(DERIVATIVES, 2.0, 1.0), shown=0.3), KNOWN, BASELINE) == 1.0
+
+
+@given(st.floats(0.3, 30.0), st.floats(0.5, 2.5), st.integers(0, 10**6))
+def test_what_is_asked_for_hangs_on_the_records_alone(shown, size, seed):
+    numbers = size * np.random.default_rng(seed).standard_normal(N)
+    asked = [spread_beside(settled(numbers, held, shown), KNOWN, held)
+             for held in (of_spread(BASELINE, KNOWN, spread) for spread in SPREADS)]  # fmt: skip
+    assert len(set(asked)) == 1
+
+
+def test_one_number_as_far_off_as_it_may_be_beside_an_explanation_is_no_spread():
+    numbers = np.where(np.arange(N) == 4, 4.9, 0.9)
+    assert spread_beside(settled(numbers), KNOWN, BASELINE) == 1.0
+
+
 def test_only_derivatives_are_wider_and_come_back():
     wide = of_spread(BASELINE, KNOWN, 2.0)
     assert np.allclose(np.diag(wide.precision), np.where(DERIVATIVES, 0.25, 1.0))
@@ -98,4 +130,15 @@ def test_an_aircraft_whose_derivatives_are_off_by_more_has_no_gap(tmp_path, whic
     files.write_case(tmp_path / "clean", texts)
     found = solve(tmp_path / "clean")
     assert found["verdict"] == "no_gap"
+    assert found["provenance"]["spread"] > SPREAD
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("which", [25, 35])  # had a rudder's power, a dihedral effect beside, with the published spread
+def test_an_effect_in_an_aircraft_whose_derivatives_are_off_by_more_has_no_company(tmp_path, which):
+    design = draw.designs(48, draw.DEVELOPMENT_SEED + 1)[which]
+    texts, _ = generate.make_case("effect", draw.wider(design, 0.08), None)
+    files.write_case(tmp_path / "effect", texts)
+    found = solve(tmp_path / "effect")
+    assert found["hypotheses"][0]["effects"] == [name for name, *_ in design.parts]
     assert found["provenance"]["spread"] > SPREAD

@@ -91,7 +91,7 @@ def test_what_stretches_the_model_is_not_all():
     much, none = (gap.Energy(noise[0], noise[0] + more, noise, np.zeros((6, 1))) for more in (5.0, 0.0))
 
     def told(tempering: float, settled: np.ndarray | None, left: gap.Energy = much, all_of_it: bool = True) -> bool:
-        where = None if settled is None else Settled(settled, np.ones_like(settled))
+        where = None if settled is None else Settled(settled, np.eye(len(settled)))
         best = Hypothesis(SetFit(), None, 0.0, 0.0, settled=where)
         found = Posterior((best,), {}, {}, np.zeros((1, 1)), tempering=tempering)
         return whole_model.incomplete(found, np.eye(0 if settled is None else len(settled)), left, all_of_it)

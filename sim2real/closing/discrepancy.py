@@ -128,16 +128,16 @@ def describe_unknown(flights: Sequence[Reconstruction], candidates: Bank, eviden
         turn = nearer(centre + nuisance_mean(gram, only, weights), only)
         if gained < SETTLED and np.array_equal(chosen, x != 0.0):
             break
-    settled = Settled(turn, _errors(gram, first, chosen))
+    settled = Settled(turn, _covariance(gram, first, chosen))
     return replace(_written(component, terms, at, x + step, chosen, covariance), settled=settled)
 
 
-def _errors(gram: FloatArray, first: int, chosen: NDArray[np.bool_]) -> FloatArray:
-    """Standard errors of nuisances [n], their prior being in the inner products, the terms chosen free beside them."""
+def _covariance(gram: FloatArray, first: int, chosen: NDArray[np.bool_]) -> FloatArray:
+    """Covariance of nuisances [n, n], their prior being in the inner products, the terms chosen free beside them."""
     kept = [*range(1, first), *(first + np.flatnonzero(chosen))]
     unit = np.r_[np.full(first - 1, NUISANCE_STEP), np.ones(len(kept) - first + 1)]
     inner = gram[np.ix_(kept, kept)] / np.outer(unit, unit)
-    return np.asarray(np.sqrt(np.diag(np.linalg.inv(inner + np.diag((unit == 1.0) * RIDGE)))[: first - 1]), np.float64)
+    return np.asarray(np.linalg.inv(inner + np.diag((unit == 1.0) * RIDGE))[: first - 1, : first - 1], np.float64)
 
 
 def _products(flights: Sequence[Reconstruction], evidences: Sequence[Evidence], rows: Sequence[NDArray],

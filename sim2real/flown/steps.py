@@ -80,10 +80,10 @@ class Point:
 
     @property
     def settled(self) -> Settled:
-        """Nuisances and their standard errors, those of the sizes in them."""
-        unit = 1.0 / np.sqrt(np.diag(self.information))
-        error = unit * np.sqrt(np.diag(np.linalg.inv(self.information * unit[:, None] * unit)))
-        return Settled(self.nuisances, np.asarray(error[len(self.sizes) :], np.float64))
+        """Nuisances and their covariance, what the sizes leave open in it."""
+        unit, k = 1.0 / np.sqrt(np.diag(self.information)), len(self.sizes)
+        covariance = np.linalg.inv(self.information * unit[:, None] * unit) * unit[:, None] * unit
+        return Settled(self.nuisances, np.asarray(covariance[k:, k:], np.float64))
 
     def without_held(self) -> Point:
         """The same with these as constants."""

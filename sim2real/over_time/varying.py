@@ -100,7 +100,7 @@ def _hypothesis(candidates: Bank, family: Family, fit: _Fit, prior: float, nothi
     log = fit.log + 0.5 * nothing
     return Hypothesis(_set_fit(candidates, family, fit, log), None, prior, log,
                       regained=forgiven(fit.left - least, nothing - fit.left),
-                      settled=Settled(fit.nuisances, np.ones_like(fit.nuisances)), varies=True)  # fmt: skip
+                      settled=Settled(fit.nuisances, np.eye(len(fit.nuisances))), varies=True)  # fmt: skip
 
 
 def _places(unknown: UnknownFit, courses: Sequence[UnknownFit]) -> set[str]:

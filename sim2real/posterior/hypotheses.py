@@ -34,10 +34,15 @@ KEPT = 1e-5  # sets of several effects less probable than this are dropped
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """Where an explanation settled in flight: nuisances [n] and their standard errors [n], in prior deviations."""
+    """Where an explanation settled in flight: nuisances [n] and their covariance [n, n], in prior deviations."""
 
     nuisances: FloatArray
-    error: FloatArray
+    covariance: FloatArray
+
+    @property
+    def error(self) -> FloatArray:
+        """Standard errors [n]."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)), np.float64)
 
 
 @dataclass(frozen=True, eq=False)
