@@ -235,7 +235,7 @@ def _written(component: str, terms: Sequence[Choice], at: dict[str, float], x: F
     """The chosen terms in their own units, the surest first."""
     kept = [t for t, c in zip(terms, chosen, strict=True) if c]
     unit = np.array([t.size for t in kept])
-    size, error = x[chosen] * unit, np.sqrt(np.diag(covariance)) * unit
+    size, error = x[chosen] * unit, np.sqrt(np.diag(covariance)) * np.abs(unit)
     order = np.argsort(-np.abs(size) / error)
     told = tuple((kept[i].term, float(size[i]), float(error[i])) for i in order)
     values = {kept[i].number: float(size[i]) for i in order}
