@@ -17,8 +17,10 @@ from sim2real.posterior.form import (
     ALIKE,
     DIRECTIONS,
     FORGIVEN,
+    INEXACT,
     LEAK,
     LUCK,
+    OF_FORM,
     SHARES,
     Form,
     Liberty,
@@ -88,6 +90,18 @@ def test_what_no_course_at_home_could_make_is_not_forgiven(left, free):
     most = min(left, free + LEAK**2 * explained)
     assert got <= 0.5 * most + 1e-6
     assert form.bare() == pytest.approx(min(6e4 + left, 6e4 + left - free + LUCK))
+
+
+@given(st.floats(0.0, 1e4), st.floats(0.0, 1e3))
+def test_only_another_form_at_home_leaves_much_elsewhere(left, home):
+    """A large effect in the library's form is no excuse for a second one: of a small one it would leave nothing."""
+    explained, noise = 1e8, 6e4
+    form = Form((0.0,), (noise + home + left,), (Liberty(home, beyond=noise + left),))
+    got = form.regained(noise + home + left + explained, noise, noise)
+    assert got <= 0.5 * (home + min(left, max(INEXACT**2 * explained, OF_FORM**2 * home))) + 1e-6
+    bent = Form((50.0 * left,), (noise + left,), (Liberty(0.0, beyond=noise + left),))
+    if left < 0.5 * LEAK**2 * explained:
+        assert bent.regained(noise + left + explained, noise, noise) == pytest.approx(50.0 * left + forgiven(left, 1e8))
 
 
 @given(st.floats(0.0, 1e4), st.floats(0.0, 1e4))

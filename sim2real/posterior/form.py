@@ -28,8 +28,9 @@ OTHER_FORM = 0.5  # prior probability that an effect has not the library's form 
 # rho: what terms at home may take, over what the set explains; equally likely, the last for single effects (assumed)
 SHARES = (0.15, 0.4, 0.8)
 # Of its signature, that a set may leave over for no reason that anybody could name; and where a component that it does
-# not enter would be a reason (assumed).
-FORGIVEN, LEAK = 0.3, 0.015
+# not enter would be a reason: in the library's form, in another, and that as a share of how far that is from the
+# library's at home (assumed).
+FORGIVEN, INEXACT, LEAK, OF_FORM = 0.3, 0.003, 0.015, 0.3
 UNKNOWN_FORGIVEN = 1.0  # the same of what generic terms explain where something unknown is (assumed)
 DIRECTIONS = 20.0  # in which such a remainder lies for every component at home (assumed)
 LUCK = 15.0  # whitened square that a free course at one component takes by luck (deviation of 120 knots' chance)
@@ -97,8 +98,9 @@ class Form:
     def way(self, k: int, nothing: float, noise: float, bare: float) -> float:
         """The same of one way, by how much the terms may take."""
         flown = self.bent and 0 < k < len(self.gained) - (self.own is not None)
-        left, free = self.left[k], self.bent if flown else self.free
-        found = [forgiven(left - noise, nothing - left, max(at.beyond - bare, 0.0), at.places, at.most) for at in free]
+        left, free, taken = self.left[k], self.bent if flown else self.free, 2.0 * max(self.gained[k], 0.0)
+        found = [forgiven(left - noise, nothing - left, max(at.beyond - bare, 0.0), at.places, at.most, taken + at.free)
+                 for at in free]
         return self.gained[k] + float(np.logaddexp.reduce(found) - np.log(len(found)))
 
     def bare(self) -> float:
@@ -107,7 +109,8 @@ class Form:
                                     if np.isfinite(at.beyond))])  # fmt: skip
 
 
-def forgiven(left: float, explained: float, foreign: float = 0.0, places: int = 1, most: float = np.inf) -> float:
+def forgiven(left: float, explained: float, foreign: float = 0.0, places: int = 1, most: float = np.inf,
+             form: float = np.inf) -> float:  # fmt: skip
     """Log evidence that a remainder regains where its scale is unknown.
 
     Args:
@@ -116,10 +119,11 @@ def forgiven(left: float, explained: float, foreign: float = 0.0, places: int = 
         foreign: as much of `left` as could not come from where the set enters.
         places: components at which it may lie.
         most: that may be left there.
+        form: whitened square by which the set is of another form there.
     """
     left, explained = max(left, 0.0), max(explained, 0.0)
     elsewhere = min(max(foreign, 0.0), left)
-    leaked = min(elsewhere, LEAK**2 * explained)
+    leaked = min(elsewhere, max(INEXACT**2 * explained, min(LEAK**2 * explained, OF_FORM**2 * form)))
     excused = leaked + min(left - elsewhere, FORGIVEN**2 * explained - leaked, most)
     directions = DIRECTIONS * places
     return float(0.5 * excused - 0.5 * directions * np.log1p(excused / directions))
