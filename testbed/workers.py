@@ -1,11 +1,14 @@
-"""What worker processes start with, a core each and memory that is kept; and how much memory a process has had."""
+"""Worker processes: a core each and memory that is kept, no longer than who started them; and memory of a process."""
 
 from __future__ import annotations
 
 import os
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from multiprocessing import get_context, parent_process
+from threading import Thread
 
 # NumPy reads the first when it is imported: set in a worker it would come too late, and as many threads as there are
 # cores, of every worker, would wait for one another. The others keep the C library from giving every large array back
@@ -23,6 +26,29 @@ def a_core_each() -> Iterator[None]:
     finally:
         for name in mine:
             del os.environ[name]
+
+
+def processes(workers: int, start: str | None = "spawn") -> ProcessPoolExecutor:
+    """Worker processes that end when the process that started them does, killed or not.
+
+    Args:
+        workers: how many.
+        start: method; None for the system's own, which hands down what was registered in this process.
+    """
+    return ProcessPoolExecutor(workers, mp_context=get_context(start), initializer=end_with_parent)
+
+
+def end_with_parent() -> None:
+    """End this process when its parent does: a killed command left workers of 1.8 GB each waiting for ever."""
+    parent = parent_process()
+    if parent is None:
+        return
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
 
 
 def peak_memory_gb() -> float | None:

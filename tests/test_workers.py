@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
 import sys
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +15,16 @@ import pytest
 from icing_env.errors import InputError
 from testbed.benchmarks.answers import answered
 from testbed.commands.diagnose import cost
-from testbed.workers import START, a_core_each, peak_memory_gb
+from testbed.workers import START, a_core_each, peak_memory_gb, processes
+
+KILLED = """
+import os, time
+from testbed.workers import processes
+if __name__ == "__main__":
+    with processes(1, {start!r}) as pool:
+        print(pool.submit(os.getpid).result(), flush=True)
+        time.sleep(600)
+"""
 
 
 def told(name: str) -> str | None:
@@ -24,10 +35,36 @@ def test_workers_start_with_it_and_nobody_else(monkeypatch):
     for name in START:
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("MALLOC_TRIM_THRESHOLD_", "1000")
-    with a_core_each(), ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+    with a_core_each(), processes(1) as pool:
         assert list(pool.map(told, START)) == ["1", START["MALLOC_MMAP_THRESHOLD_"], "1000"]
     assert "OMP_NUM_THREADS" not in os.environ
     assert os.environ["MALLOC_TRIM_THRESHOLD_"] == "1000"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of another kind")
+@pytest.mark.parametrize("start", ["spawn", None])
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
+def test_workers_end_with_a_command_that_is_killed(tmp_path, start, how):
+    (tmp_path / "command.py").write_text(KILLED.format(start=start))
+    command = subprocess.Popen([sys.executable, tmp_path / "command.py"], stdout=subprocess.PIPE, text=True)
+    worker = int(command.stdout.readline())
+    assert there(worker)
+    command.send_signal(how)
+    command.wait()
+    command.stdout.close()
+    until = time.monotonic() + 30.0
+    while there(worker) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not there(worker)
+
+
+def there(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    told = Path(f"/proc/{process}/stat")  # ended, but nobody has asked how: in a container perhaps for ever
+    return not (told.is_file() and told.read_text().rpartition(")")[2].split()[0] == "Z")
 
 
 def test_a_case_that_fails_is_an_answer_and_costs_no_other_its_own():

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from contextlib import contextmanager
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord
 from testbed.withheld.files import write_text
+from testbed.workers import processes
 
 OPEN = 0o700  # of the key folder outside the diagnosis
 Progress = Callable[[str], None]
@@ -32,7 +32,7 @@ def answer_all(out: Path, folder: str, jobs: Mapping[str, tuple[Any, ...]], work
     answers, names = out / folder, list(jobs)
     answers.mkdir(parents=True, exist_ok=True)
     left = [name for name in names if not (answers / f"{name}.json").is_file()]
-    with closed(out / "keys"), ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with closed(out / "keys"), processes(workers) as pool:
         running = {pool.submit(solver, out / "records" / name, *jobs[name]): name for name in left}
         for k, task in enumerate(as_completed(running), start=len(names) - len(left) + 1):
             write_text(answers / f"{running[task]}.json", json.dumps(task.result(), allow_nan=False))

@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import partial
 
@@ -25,6 +24,7 @@ from icing_env.errors import InputError
 from icing_env.record import FlightRecord
 from testbed.flight import fly
 from testbed.reproduce.windows import part
+from testbed.workers import processes
 
 NAMES = ("CL_alpha", "CL_elevator", "CD_0", "Cm_alpha", "Cm_q", "Cm_elevator", "CY_beta", "CY_r", "CY_rudder",
          "Cl_beta", "Cl_p", "Cl_r", "Cl_aileron", "Cl_rudder", "Cn_beta", "Cn_p", "Cn_r", "Cn_rudder")  # fmt: skip
@@ -75,7 +75,7 @@ def study(methods: Sequence[str], sigmas: Sequence[float], records: int, first: 
         workers: processes.
     """
     found = []
-    with ProcessPoolExecutor(workers) as pool:
+    with processes(workers, None) as pool:
         for sigma_w in sigmas:
             tell = partial(_identified, tuple(methods), sigma_w)
             flights = list(pool.map(tell, range(first, first + records), chunksize=5))

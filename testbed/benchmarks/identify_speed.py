@@ -12,10 +12,8 @@ import os
 import statistics
 import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -31,6 +29,7 @@ from icing_env import scenario as scenarios
 from icing_env.record import FlightRecord
 from icing_env.types import ESTIMATE
 from testbed.flight import fly
+from testbed.workers import processes
 
 CHANNELS = ("time", "airspeed", "alpha", "q", "theta", "ax", "az", "elevator", "thrust_left", "thrust_right",
             "pressure", "temperature")  # fmt: skip
@@ -91,7 +90,7 @@ def many_records() -> float:
     kept = {name: os.environ.get(name) for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")}
     os.environ.update(dict.fromkeys(kept, "1"))  # two processes on two cores: more threads only wait for each other
     try:
-        with ProcessPoolExecutor(PROCESSES, mp_context=get_context("spawn")) as pool:
+        with processes(PROCESSES) as pool:
             list(pool.map(regress, [1] * PROCESSES, range(PROCESSES)))
             start = time.perf_counter()
             list(pool.map(regress, [RECORDS // PROCESSES] * PROCESSES, range(0, RECORDS, RECORDS // PROCESSES)))

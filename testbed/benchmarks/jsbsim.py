@@ -7,8 +7,7 @@ kept, so that an interrupted run goes on.
 from __future__ import annotations
 
 import json
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from concurrent.futures import as_completed
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from testbed.withheld.jsbsim_cases import Design, designs, write_case
 from testbed.withheld.jsbsim_edit import data_root
 from testbed.withheld.jsbsim_score import score
 from testbed.withheld.jsbsim_tables import differences, differing
-from testbed.workers import a_core_each
+from testbed.workers import a_core_each, processes
 
 CASES = 16
 
@@ -63,7 +62,7 @@ def _fly(out: Path, drawn: list[Design], seed: int, root: Path, workers: int, pr
     if told.is_file() and read_json(told) != mine:
         raise InputError(f"{out}: holds another set ({read_json(told)}); give another --out")
     write_text(told, json.dumps(mine))
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with processes(workers) as pool:
         running = [pool.submit(write_case, design, root, records, keys) for design in drawn]
         for k, task in enumerate(as_completed(running), start=1):
             task.result()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +14,7 @@ from testbed.comparison.metrics import per_episode, summary
 from testbed.comparison.suite import Suite
 from testbed.comparison.trace import trace
 from testbed.flight import CONTROLLERS, Controller, controller, make_world
+from testbed.workers import processes
 
 Progress = Callable[[str], None]
 
@@ -82,7 +82,7 @@ def in_order(asked: Sequence[Row], workers: int, progress: Progress | None
                 progress(str(row))
             yield fly_row(row)
         return
-    with ProcessPoolExecutor(workers) as pool:
+    with processes(workers, None) as pool:
         for row, runs in zip(asked, pool.map(fly_row, asked), strict=True):
             if progress is not None:
                 progress(str(row))

@@ -10,10 +10,8 @@ import argparse
 import json
 import secrets
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from itertools import groupby
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -27,7 +25,7 @@ from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
 from testbed.withheld.plant import DT
 from testbed.withheld.separation import Distances, Geometry, distances, geometry
 from testbed.withheld.windows import Held, closures, held
-from testbed.workers import a_core_each
+from testbed.workers import a_core_each, processes
 
 TRIES, SMALLER = 8, 0.75  # an aircraft that departs gets a smaller effect
 SMALLEST_FACTOR = 0.01  # by which an unknown effect is scaled down
@@ -71,7 +69,7 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
             done += _make(group, records, keys)
             progress(f"flown {done} of {len(drawn)}")
     elif groups:
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        with processes(workers) as pool:
             for made in pool.map(_make, groups, [records] * len(groups), [keys] * len(groups)):
                 done += made
                 progress(f"flown {done} of {len(drawn)}")

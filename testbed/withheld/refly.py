@@ -12,10 +12,8 @@ import json
 import math
 import re
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import product, repeat
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +28,7 @@ from testbed.withheld.flights import Aircraft, recorded
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
 from testbed.withheld.published import DERIVATIVES, SENSOR_KNOBS
 from testbed.withheld.windows import gap_of, held
-from testbed.workers import a_core_each
+from testbed.workers import a_core_each, processes
 
 FLOWN_AGAIN = ("single", "pair")  # tiers with an effect that the library holds
 # All that the plant has to add to: derivatives, constants, instruments' errors, what describes something unknown.
@@ -61,7 +59,7 @@ def refly(answers: Path, keys: Path, out: Path, workers: int = 1,
         done = map(_one, left, repeat(keys), repeat(out))
         _tell(done, len(left), progress)
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with processes(workers) as pool:
         _tell(pool.map(_one, left, repeat(keys), repeat(out), chunksize=8), len(left), progress)
 
 
