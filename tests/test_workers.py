@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,11 @@ def test_a_case_that_fails_is_an_answer_and_costs_no_other_its_own():
     assert answered(lambda: {"verdict": "no_gap"}) == {"verdict": "no_gap"}
     assert answered(lambda: refused("x")) == {"error": "no number: x"}
     assert answered(lambda: {}["lacking"]) == {"error": "KeyError: 'lacking'"}
+
+
+def test_an_installation_that_lacks_something_is_no_answer():
+    with pytest.raises(ImportError, match="sim2real_of_another_version"):
+        answered(lambda: vars(import_module("sim2real_of_another_version")))
 
 
 def refused(text: str) -> dict[str, object]:

@@ -61,9 +61,15 @@ def diagnosis_of(records: Sequence[FlightRecord], held_out: Sequence[FlightRecor
 
 
 def answered(work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """One case's answer; where a record is refused or `work` fails, why: it must not cost other cases their answers."""
+    """One case's answer; where a record is refused or `work` fails, why: it must not cost other cases their answers.
+
+    Raises:
+        ImportError: the installation lacks something, which says nothing of the case.
+    """
     try:
         return work()
+    except ImportError:
+        raise
     except InputError as error:
         return {"error": str(error)}
     except Exception as error:
