@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sim2real.diagnosis import Diagnosis
 from sim2real.library.candidates import SPREAD
 from sim2real.library.terms import PURE_DELAY
 from sim2real.posterior.generic import COURSE
+
+FEW = 3  # names that a list shows
 
 
 def sentences(found: Diagnosis) -> list[str]:
@@ -62,6 +64,12 @@ def late_by(unknown: Mapping[str, Any]) -> float:
     return float(sum(t["coefficient"] for t in unknown["terms"] if t["term"] == PURE_DELAY))
 
 
+def listed(names: Sequence[str]) -> str:
+    """A few names, and how many more: an effect too small to be seen is like every other."""
+    more = len(names) - FEW
+    return ", ".join(names[:FEW]) + (f" and {more} more" if more > 0 else "")
+
+
 def term_named(term: str) -> str:
     """A term as tables have it; a free course of time is told by the root mean square of its heights."""
     return "course of time, RMS" if term == COURSE else term
@@ -83,7 +91,7 @@ def _named(effect: dict[str, Any]) -> str:
     size = ", ".join(f"{k} {p['estimate']:.3g} {'' if p['unit'] == '1' else p['unit']}".rstrip()
                      for k, p in effect["parameters"].items() if p["low95"] != p["high95"])  # fmt: skip
     told, form = effect["indistinguishable_from"], effect["other_form"]
-    other = f", which these records cannot tell from {', '.join(told)}," if told else ""
+    other = f", which these records cannot tell from {listed(told)}," if told else ""
     terms = ", ".join(t["term"] for t in form["terms"] if t["term"] != "1") if form else ""
     bent = f" in another form than the library's ({form['component']} by {terms or 'a constant'})" if form else ""
     return f"{effect['name']} ({size}{_varying(effect)}){bent}{other}"

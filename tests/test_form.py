@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -228,6 +230,10 @@ def test_what_small_commands_lose_is_no_form_of_a_gearing():
     assert not is_home(geared, dead, 1000.0, 700.0, raw)
     assert is_home(geared, dead, 1000.0, 900.0, raw)  # what explains nearly all is the cause, whatever is left
     assert is_home(geared, bent, 1000.0, 700.0, raw)
+    for least, so in ((60.0, True), (140.0, False)):  # of 1000 that the terms explain, nothing left over by them
+        formed = replace(geared, form=Form((0.0,), (least,)))
+        assert is_home(formed, dead, 1000.0, 700.0, raw) is so  # in its own form it says nearly all that they do
+        assert not is_home(formed, dead, 1000.0, 550.0, raw)  # alone it says no more than what is like it would
 
 
 def test_terms_are_an_effect_for_their_shape_where_they_are_of_its_own_regressors():

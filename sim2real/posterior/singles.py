@@ -12,6 +12,7 @@ from sim2real.library.sizes import interpolated, piece_prior
 
 INDISTINGUISHABLE = 3.5  # whitened distance below which two explanations are told as one
 DETECTABLE = 3.5  # whitened distance from no gap at which an effect counts as shown
+TAKES = 0.5  # of the whitened square of an effect's signature, that one it is told as one with takes (assumed)
 GRID, FINE = 601, 161
 
 
@@ -104,6 +105,7 @@ def ambiguity(reduced: FloatArray, fits: dict[str, EffectFit],
     """For every effect those whose signatures these records cannot tell from its own at its fitted size.
 
     Distance of i to j: the least over j's size (linear about its fit) of the whitened difference of their signatures.
+    One that takes less than TAKES of what an effect says does no better than none, however little there is to say.
     """
     names = list(fits)
     weights = np.zeros((len(names), len(reduced)))
@@ -113,5 +115,6 @@ def ambiguity(reduced: FloatArray, fits: dict[str, EffectFit],
     own = np.diag(inner)
     apart = own[:, None] - np.where(own > 0.0, inner**2 / np.where(own > 0.0, own, 1.0), 0.0)
     near = (own[:, None] > 0.0) & (np.sqrt(np.maximum(apart, 0.0)) < INDISTINGUISHABLE)
+    near &= apart <= (1.0 - TAKES) * own[:, None]
     near &= np.array([probability[name] >= 1e-4 * max(probability.values(), default=0.0) for name in names], bool)
     return {name: tuple(names[j] for j in np.flatnonzero(near[i]) if j != i) for i, name in enumerate(names)}

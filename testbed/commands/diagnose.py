@@ -192,6 +192,8 @@ def show_ladder(ladder: dict[str, Any]) -> None:
 
 
 def _parameter(entry: dict[str, Any]) -> tuple[str, str, str, str]:
+    from sim2real.words import listed
+
     name, p = max(entry["parameters"].items(), key=lambda item: item[1]["high95"] - item[1]["low95"])
     return (f"{name} [{p['unit']}]", f"{p['estimate']:.4g}", f"{p['low95']:.4g} .. {p['high95']:.4g}",
-            ", ".join(entry["indistinguishable_from"][:4]))
+            listed(entry["indistinguishable_from"]))

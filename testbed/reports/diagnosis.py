@@ -16,7 +16,7 @@ from sim2real.diagnosis import Diagnosis
 from sim2real.prediction.windows import COMPARED, cut, residuals
 from sim2real.records.channels import TOLERANCE
 from sim2real.where import stretches
-from sim2real.words import of_the_model, sentences, term_named
+from sim2real.words import listed, of_the_model, sentences, term_named
 from testbed.commands.common import plain
 from testbed.reports.diagnosis_figures import bars, heat, ladder_gaps, regime_heat, size_histories
 from testbed.reports.page import Report
@@ -26,7 +26,6 @@ from testbed.reports.surface_answers import answer, by_surface, suspected
 
 KIND = {"no_gap": "good", "explained": "caution", "unknown": "bad"}
 OVERLAID = ("airspeed", "alpha", "q", "theta", "ax", "az", "beta", "p", "r", "phi", "ay")
-FEW = 3  # effects named of those that one cannot be told from
 
 
 def write_report(found: Diagnosis, result: Mapping[str, Any], folder: Path) -> Path:
@@ -73,7 +72,7 @@ def _explanations(report: Report, result: Mapping[str, Any]) -> None:
     for effect in result["effects"]:
         for name, p in effect["parameters"].items():
             rows.append([effect["name"], f"{effect['probability']:.3f}", f"{name} [{p['unit']}]", p["estimate"],
-                         f"{p['low95']:.4g} to {p['high95']:.4g}", _listed(effect["indistinguishable_from"])])
+                         f"{p['low95']:.4g} to {p['high95']:.4g}", listed(effect["indistinguishable_from"]) or None])
     if rows:
         report.table(["effect", "probability", "parameter", "estimate", "95 %", "cannot be told from"], rows,
                      "Effects that these records leave possible.")
@@ -98,12 +97,6 @@ def _terms(report: Report, described: Mapping[str, Any], what: str) -> None:
     report.table(["term", "coefficient", "standard error"],
                  [[term_named(t["term"]), t["coefficient"], t["std_error"]] for t in described["terms"]],
                  f"{what}, as {at} ({described['kind']}); coefficients in SI units, angles in rad, delays in s.")
-
-
-def _listed(names: list[str]) -> str | None:
-    """A few names, and how many more: an effect too small to be seen is like every other."""
-    more = len(names) - FEW
-    return ", ".join(names[:FEW]) + (f" and {more} more" if more > 0 else "") or None
 
 
 def _where(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:
