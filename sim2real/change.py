@@ -10,6 +10,7 @@ from sim2real.baseline.references import Baseline
 from sim2real.closing import gap, whole_model
 from sim2real.closing.discrepancy import Description, describe_unknown, described, in_other_form
 from sim2real.closing.own_numbers import of_component, with_own_numbers
+from sim2real.closing.parts import Flown, flown_parts
 from sim2real.closing.remedy import Remedy, leading, remedy
 from sim2real.closing.whole_model import WholeModel
 from sim2real.library.candidates import Bank
@@ -44,23 +45,19 @@ class Told:
 
 @dataclass(frozen=True)
 class Changed:
-    """What is changed in the model, and what that leaves of the gap on the diagnosed records.
+    """What the records ask to be changed.
 
     Attributes:
         posterior: with many numbers at once among its explanations, if that is the answer.
         told: the explanation.
         whole: the model with all its numbers fitted, if that is the answer.
-        alone, effects_alone: the effects alone, the model's own numbers as they were, and what they leave.
-        change, training: all that is changed, and what it leaves.
+        flown: what is changed of it, and what that leaves.
     """
 
     posterior: Posterior
     told: Told
     whole: WholeModel | None
-    alone: Remedy
-    effects_alone: gap.Energy
-    change: Remedy
-    training: gap.Energy
+    flown: Flown
 
 
 def changed(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,
@@ -78,21 +75,21 @@ def changed(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
     alone, sigmas = remedy(told.explained, told.flown), [e.sigma_w for e in evidences]
     progress("flying the records freely, before and after")
     left = flown_freely(flights, sigmas, alone, seed)
-    change = with_own_numbers(alone, told.explained, told.flown, candidates.nuisances)
     if any_aircraft and whole_model.suspected(posterior, baseline.precision):
-        judged = _judged(flights, told, alone, change, left)
+        judged = _judged(flights, told, alone, left, candidates)
         all_of_it = (told.flown is None or bool(told.flown.values)) and not posterior.best.varies
         if whole_model.incomplete(posterior, baseline.precision, judged, all_of_it):
             whole = _whole(flights, candidates, posterior, told, sigmas, judged, seed, progress)
             if whole is not None:
                 return whole
-    training = left if change is alone else replace(left, after=gap.of_all(flights, change, change.paths))
-    return Changed(posterior, told, None, alone, left, change, training)
+    flown = flown_parts(flights, left, told.explained, told.flown, candidates.nuisances)
+    return Changed(posterior, told, None, flown)
 
 
-def _judged(flights: Sequence[Reconstruction], told: Told, alone: Remedy, change: Remedy, left: gap.Energy
+def _judged(flights: Sequence[Reconstruction], told: Told, alone: Remedy, left: gap.Energy, candidates: Bank
             ) -> gap.Energy:  # fmt: skip
     """The records in free flight with an explanation; beside terms, the numbers of their component were fitted too."""
+    change = with_own_numbers(alone, told.explained, told.flown, candidates.nuisances)
     if told.flown is None or change is alone:
         return left
     at_home = of_component(change, told.flown.component)
@@ -112,7 +109,7 @@ def _whole(flights: Sequence[Reconstruction], candidates: Bank, posterior: Poste
     told = Told(leading(judge(posterior)[0], posterior), told.unknown, None)
     alone = remedy(told.explained, None)
     left = replace(closer, after=gap.of_all(flights, alone, everything.paths))
-    return Changed(posterior, told, whole, alone, left, everything, closer)
+    return Changed(posterior, told, whole, Flown(alone, left, everything, closer))
 
 
 def _told(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence], baseline: Baseline,

@@ -18,7 +18,8 @@ from sim2real.answer import credible, describe, detection_limits, judge, problem
 from sim2real.baseline.references import Baseline, fit_baseline
 from sim2real.change import Changed, changed, flown_freely
 from sim2real.closing import gap
-from sim2real.closing.remedy import Remedy, resimulation, values_of
+from sim2real.closing.parts import Flown
+from sim2real.closing.remedy import Remedy, remedy, resimulation, values_of
 from sim2real.closing.whole_model import components_with
 from sim2real.ladder import ladder
 from sim2real.library.candidates import SPREAD, Bank, bank, not_testable
@@ -98,16 +99,17 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     untestable = not_testable(flights, candidates)
     evidences, posterior, baseline = fit(flights, candidates, untestable, at_hand.baseline, progress)
     found = changed(flights, candidates, evidences, baseline, posterior, seed, not (reference or simulator), progress)
-    posterior, explained = found.posterior, found.told.explained
+    posterior, explained, flown = found.posterior, found.told.explained, found.flown
     sizes = _over_time(replace(at_hand, baseline=baseline), evidences, found, progress)
     progress("flying what these records could have revealed")
     shown = limits(evidences, candidates, baseline, posterior.tempering, posterior.fits)
     sigma = float(np.mean([e.sigma_w for e in evidences]))
-    tested, less = _held_out(others, found, sigma, seed) if others else (None, None)
-    closes = {"training": _closed(found), "held_out": gap.held_out(tested, seed, less)}
+    tested, less = _held_out(others, flown, sigma, seed) if others else (None, None)
+    closes = {"training": _closed(flown), "held_out": gap.held_out(tested, seed, less)}
     if climb and tested is not None and less is not None:
         closes["ladder"] = ladder(flights, others, candidates, baseline, evidences, posterior, explained,
-                                  found.change.paths, tested, less, seed, progress)  # fmt: skip
+                                  flown.change.paths, flown.training, tested, less, seed,
+                                  progress)  # fmt: skip
     lacking = found.whole or found.told.unknown
     verdict, hypotheses = judge(posterior)
     progress("looking for what to fly next")
@@ -115,7 +117,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         verdict=verdict,
         hypotheses=hypotheses,
         credible_set_95=credible([h["probability"] for h in hypotheses]),
-        where={"channels": gap.by_channel(found.training.before), "components": _places(found),
+        where={"channels": gap.by_channel(flown.training.before), "components": _places(found),
                "regimes": regimes(evidences)},
         effects=[describe(name, posterior, explained, found.told.form, sizes.get(name, SAME))
                  for name, p in ranked(posterior) if p >= LISTED],
@@ -124,13 +126,13 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         unknown=None if lacking is None else lacking.answer(),
         gap=closes,
         next_manoeuvre=_next(flights[0], candidates, posterior, hypotheses, sigma, baseline.precision),
-        resimulate=resimulation(found.change, found.training, flights, evidences),
+        resimulate=resimulation(flown.change, flown.training, flights, evidences),
         data_problems=problems((*flights, *others)),
         provenance=provenance(flights, others, evidences, at_hand.without, len(reference), seed)
         | {"tempering": posterior.tempering, "model": baseline.answer() if reference else None,
            "spread": None if baseline.spread is None else baseline.spread * SPREAD},
         seconds=time.perf_counter() - began,
-        details=Details(tuple(flights), tuple(others), tuple(evidences), posterior, found.change, found.training,
+        details=Details(tuple(flights), tuple(others), tuple(evidences), posterior, flown.change, flown.training,
                         tested),
     )
 
@@ -174,15 +176,15 @@ def _over_time(at_hand: _AtHand, evidences: Sequence[Evidence], found: Changed, 
         return {}
     progress("looking at how the sizes went along the records")
     return histories(at_hand.flights, at_hand.candidates, evidences, at_hand.baseline, found.posterior, explained.fit,
-                     found.alone, found.told.flown)
+                     remedy(explained, found.told.flown), found.told.flown)
 
 
-def _held_out(others: Sequence[Reconstruction], found: Changed, sigma: float, seed: int
+def _held_out(others: Sequence[Reconstruction], flown: Flown, sigma: float, seed: int
               ) -> tuple[gap.Energy, FloatArray]:  # fmt: skip
     """Held-out records before and after, and what the effects alone leave of them [windows, channels]."""
-    tested = flown_freely(others, [sigma] * len(others), found.change, seed + 1000)
-    alone = found.change is found.alone
-    return tested, tested.after if alone else gap.of_all(others, found.alone, found.change.paths)
+    tested = flown_freely(others, [sigma] * len(others), flown.change, seed + 1000)
+    alone = flown.change is flown.alone
+    return tested, tested.after if alone else gap.of_all(others, flown.alone, flown.change.paths)
 
 
 def _places(found: Changed) -> dict[str, float]:
@@ -191,11 +193,10 @@ def _places(found: Changed) -> dict[str, float]:
     return places if found.whole is None else components_with(places, found.whole)
 
 
-def _closed(found: Changed) -> dict[str, float]:
+def _closed(flown: Flown) -> dict[str, float]:
     """The gap of the diagnosed records before, after, and with the effects alone."""
-    return {"before": gap.g(found.training.before, found.training.alone),
-            "after": gap.g(found.training.after, found.training.alone),
-            "after_effects_alone": gap.g(found.effects_alone.after, found.effects_alone.alone)}  # fmt: skip
+    return {"before": gap.g(flown.training.before, flown.training.alone), "after": flown.left,
+            "after_effects_alone": gap.g(flown.effects_alone.after, flown.effects_alone.alone)}
 
 
 def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, simulator: Rollout | None

@@ -19,8 +19,9 @@ from icing_env.record import FloatArray
 from sim2real.actuators.paths import driven
 from sim2real.baseline.references import Baseline
 from sim2real.closing import black_box, gap
-from sim2real.closing.discrepancy import describe_unknown
+from sim2real.closing.discrepancy import Description, describe_unknown
 from sim2real.closing.own_numbers import own_numbers, with_own_numbers
+from sim2real.closing.parts import flown_parts
 from sim2real.closing.remedy import Remedy, remedy
 from sim2real.library.candidates import Bank, not_testable
 from sim2real.posterior.form import home
@@ -37,7 +38,7 @@ Rung = dict[str, Any]
 
 def ladder(flights: Sequence[Reconstruction], others: Sequence[Reconstruction], candidates: Bank, baseline: Baseline,
            evidences: Sequence[Evidence], posterior: Posterior, explained: Hypothesis | None, paths: gap.Paths,
-           tested: gap.Energy, effects_alone: FloatArray, seed: int,
+           trained: gap.Energy, tested: gap.Energy, effects_alone: FloatArray, seed: int,
            progress: Progress = lambda text: None) -> dict[str, Any]:
     """Every rung on the held-out records.
 
@@ -45,6 +46,7 @@ def ladder(flights: Sequence[Reconstruction], others: Sequence[Reconstruction], 
         flights, others: diagnosed and held-out records.
         explained: the diagnosed explanation.
         paths: of `gap.energies`, those that it enters.
+        trained: residual energies of the diagnosed records.
         tested: residual energies of the held-out records before and after all that it changes.
         effects_alone: what its effects alone leave [windows, channels].
         seed: of synthetic records and intervals.
@@ -56,7 +58,8 @@ def ladder(flights: Sequence[Reconstruction], others: Sequence[Reconstruction], 
     """
     progress("climbing the evidence ladder: the runner-up")
     rival = runner_up(posterior, explained)
-    second = _remedy_of(rival, flights, candidates, evidences, baseline, posterior)
+    second = flown_parts(flights, trained, rival, _terms(rival, flights, candidates, evidences, baseline, posterior),
+                         candidates.nuisances, paths).change  # fmt: skip
     settled = next((h.settled for h in posterior.hypotheses if not h.effects and h.unknown is None), None)
     numbers = Remedy() if settled is None else own_numbers(settled, candidates.nuisances)
     left = {"nothing": ([], tested.before), "numbers alone": ([], gap.of_all(others, numbers, paths)),
@@ -97,7 +100,8 @@ def search_on_nothing(flights: Sequence[Reconstruction], others: Sequence[Recons
     untestable = not_testable(made, candidates)
     found, posterior, _ = fit(made, candidates, untestable, baseline, lambda text: None)
     best = runner_up(posterior, None)
-    change = _remedy_of(best, made, candidates, found, baseline, posterior)
+    terms = _terms(best, made, candidates, found, baseline, posterior)
+    change = with_own_numbers(remedy(best, terms), best, terms, candidates.nuisances)
     before, after = (float(np.sqrt(np.nanmean(gap.of_all(tests, what)))) for what in (Remedy(), change))
     return {"effects": _names(best), "probability_no_gap": posterior.none, "before": before, "after": after,
             "closure": 1.0 - after / before}
@@ -127,11 +131,11 @@ def synthetic(flight: Reconstruction, sigma: float, seed: int) -> list[Reconstru
     return out
 
 
-def _remedy_of(hypothesis: Hypothesis, flights: Sequence[Reconstruction], candidates: Bank,
-               evidences: Sequence[Evidence], baseline: Baseline, posterior: Posterior) -> Remedy:
-    unknown = None if hypothesis.unknown is None else describe_unknown(
+def _terms(hypothesis: Hypothesis, flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequence[Evidence],
+           baseline: Baseline, posterior: Posterior) -> Description | None:  # fmt: skip
+    """Of something unknown, if there is any."""
+    return None if hypothesis.unknown is None else describe_unknown(
         flights, candidates, evidences, baseline, posterior.tempering, hypothesis)
-    return with_own_numbers(remedy(hypothesis, unknown), hypothesis, unknown, candidates.nuisances)
 
 
 def _names(hypothesis: Hypothesis | None) -> list[str]:

@@ -40,7 +40,7 @@ def with_own_numbers(alone: Remedy, explained: Hypothesis | None, described: Des
     if not alone.values or settled is None:
         return alone
     numbers = own_numbers(settled, moves)
-    return replace(numbers, values=numbers.values | alone.values, covariance=alone.covariance)
+    return replace(alone, values=numbers.values | alone.values, own=numbers.own)
 
 
 def of_component(change: Remedy, component: str) -> Remedy:

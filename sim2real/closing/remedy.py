@@ -34,11 +34,13 @@ class Remedy:
         values: as `icing_env.effects.with_effects` takes them.
         covariance: of the fitted numbers, those of the set first, then the unknown's terms; None where none is known.
         own: the model's own numbers that are flown with them: relative change and its standard error, by name.
+        through: surfaces that follow their commands though nothing of it enters there.
     """
 
     values: Values = field(default_factory=dict)
     covariance: FloatArray | None = None
     own: dict[str, tuple[float, float]] = field(default_factory=dict)
+    through: tuple[str, ...] = ()
 
     def __call__(self, parameters: NDArray) -> NDArray:
         """PARAMETERS with the values in them."""
@@ -46,11 +48,11 @@ class Remedy:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Surfaces whose actuator is part of it."""
+        """Surfaces that follow their commands: those whose actuator is part of it."""
         entered = {component for name in self.values if name != "discrepancy"
                    for component in effects.get(name).enters_at}  # fmt: skip
         bent = self.values.get("discrepancy", {})
-        return tuple(surface for surface in SURFACES if f"{surface}_path" in entered
+        return tuple(surface for surface in SURFACES if surface in self.through or f"{surface}_path" in entered
                      or any(bent.get(number) for number in PATHS[surface]))  # fmt: skip
 
     @property
