@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from icing_env.errors import InputError
+from testbed.reports.diagnosis import caption_of_terms
 from testbed.reports.page import Report, figure_source, format_cell
 from testbed.reports.plot_style import KNOT, ROLES, SCALES
 from testbed.reports.plotting import derivative_dots, estimate_history, gap_bars, time_histories
@@ -252,3 +253,10 @@ def test_browser_shows_the_report(tmp_path: Path) -> None:
     assert red.sum() == pytest.approx(300 * 300, rel=0.05)
     line = np.abs(pixels - (31, 119, 180)).max(axis=2) < 40  # the default line of the figure below it
     assert line.sum() > 100
+
+
+def test_a_table_of_terms_says_whether_the_reports_aircraft_has_them():
+    terms = {"component": "elevator_path", "kind": "static"}
+    assert "terms of elevator_path (static), told and not flown;" in caption_of_terms(terms, "What is there", False)
+    assert "not flown" not in caption_of_terms(terms, "What is there", True)
+    assert "not flown" not in caption_of_terms(terms | {"places": {}}, "What is there", False)

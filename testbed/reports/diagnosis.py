@@ -81,7 +81,7 @@ def _explanations(report: Report, result: Mapping[str, Any]) -> None:
             report.figure(size_histories(effect), f"The size of {effect['name']} by stretch of every record, with its "
                           "95 % interval (shaded); dashed: one size for all records.")
     if result["unknown"]:
-        _terms(report, result["unknown"], "What the library lacks")
+        _terms(report, result, result["unknown"], "What the library lacks")
         if "places" in result["unknown"]:
             report.table(["component", "changed by"], [[c, f"{v:.2f}"] for c, v in sorted(
                 result["unknown"]["places"].items(), key=lambda item: -item[1])],
@@ -89,14 +89,27 @@ def _explanations(report: Report, result: Mapping[str, Any]) -> None:
                 "the rate that it makes in half a second).")  # fmt: skip
     for effect in result["effects"]:
         if effect["other_form"]:
-            _terms(report, effect["other_form"], f"What {effect['name']} is beside the library's form of it")
+            _terms(report, result, effect["other_form"], f"What {effect['name']} is beside the library's form of it")
 
 
-def _terms(report: Report, described: Mapping[str, Any], what: str) -> None:
-    at = f"terms of {described['component']}" if "places" not in described else "changes of the model's numbers"
+def _terms(report: Report, result: Mapping[str, Any], described: Mapping[str, Any], what: str) -> None:
     report.table(["term", "coefficient", "standard error"],
                  [[term_named(t["term"]), t["coefficient"], t["std_error"]] for t in described["terms"]],
-                 f"{what}, as {at} ({described['kind']}); coefficients in SI units, angles in rad, delays in s.")
+                 caption_of_terms(described, what, "discrepancy:" in result["resimulate"]["command"]))
+
+
+def caption_of_terms(described: Mapping[str, Any], what: str, flown: bool) -> str:
+    """What a table of terms shows, and whether they are in the aircraft that the report flies.
+
+    Args:
+        described: `unknown` or `other_form` of an answer.
+        what: they are.
+        flown: whether any terms are.
+    """
+    every = "places" in described  # all numbers of the model, which fly as such
+    at = "changes of the model's numbers" if every else f"terms of {described['component']}"
+    told = "" if flown or every else ", told and not flown"
+    return f"{what}, as {at} ({described['kind']}){told}; coefficients in SI units, angles in rad, delays in s."
 
 
 def _where(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:
