@@ -62,6 +62,16 @@ DISCREPANCY_PARAMETERS: list[Field] = [
     *PATH_PARAMETERS,
 ]
 
+# What says how a derivative changes with angles, rates, thrust and speed: a factor of it is a factor of them.
+CHANGES_OF: dict[str, tuple[str, ...]] = {
+    "CZ_alpha": ("CZ_alpha2", "CZ_alpha3", "CZ_alpha_CT"), "CY_beta": ("CY_alpha_beta", "CY_beta3", "CY_beta_CT"),
+    "Cl_beta": ("Cl_alpha_beta", "Cl_beta3", "Cl_beta_CT"), "Cn_beta": ("Cn_alpha_beta", "Cn_beta3", "Cn_beta_CT"),
+    "Cm_alpha": ("Cm_alpha2", "Cm_alpha3", "Cm_alpha_CT"), "Cm_q": ("Cm_alpha_q", "Cm_q3"),
+    "Cm_elevator": ("Cm_elevator2", "Cm_elevator3", "Cm_alpha_elevator", "Cm_elevator_airspeed"),
+    "Cl_p": ("Cl_alpha_p", "Cl_p3"), "Cl_aileron": ("Cl_aileron3", "Cl_aileron_airspeed"),
+    "Cn_rudder": ("Cn_alpha_rudder", "Cn_rudder3", "Cn_rudder_airspeed"),
+}
+
 
 def bends(surface: str) -> tuple[str, ...]:
     """Names of PATH_PARAMETERS of a surface."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from plant import fleet_at
 
 from icing_env.aircraft import broadcast, changed, load
+from icing_env.discrepancy import CHANGES_OF
 from icing_env.effects import LIBRARY, get, parse, with_effects
 from icing_env.effects.effect import ENTERS_AT, Component, Effect
 from icing_env.errors import InputError
@@ -149,6 +150,28 @@ def test_any_company_of_effects_gives_finite_numbers(shares: dict[str, float]) -
     }
     row = with_effects(AIRCRAFT, values)
     assert all(np.isfinite(row[name]).all() for name in PARAMETERS.names)
+
+
+@pytest.mark.parametrize("name", ["lift_slope", "static_stability", "pitch_damping", "elevator_power", "roll_damping",
+                                  "dihedral_effect", "aileron_power", "directional_stability", "rudder_power",
+                                  "side_force"])  # fmt: skip
+def test_a_derivative_that_is_weaker_is_so_in_every_condition(name: str) -> None:
+    """A corrected model's derivatives change with angles, rates and thrust: a factor is one of the whole."""
+    bent = AIRCRAFT.copy()
+    for derivative, more in CHANGES_OF.items():
+        for number in more:
+            assert bent[number] == 0.0  # of the published aircraft
+            bent[number] = 0.3 * bent[derivative]
+    weaker = with_effects(bent, {name: {"change": -0.25}})
+    touched = {n for n in PARAMETERS.names if weaker[n] != bent[n]}
+    assert touched == touched_by(name) | {n for d in touched_by(name) for n in CHANGES_OF.get(d, ())}
+    assert all(weaker[n] == pytest.approx(0.75 * bent[n]) for n in touched)
+
+
+def touched_by(name: str) -> set[str]:
+    """Numbers of the published aircraft that an effect changes."""
+    weaker = with_effects(AIRCRAFT, {name: {"change": -0.25}})
+    return {n for n in PARAMETERS.names if weaker[n] != AIRCRAFT[n]}
 
 
 # ---- the command line's form

@@ -5,6 +5,8 @@ from functools import cache
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from icing_env import aircraft, scenario
 from icing_env.record import FlightRecord
@@ -12,7 +14,7 @@ from sim2real.diagnosis import diagnose
 from sim2real.library.candidates import bank, not_testable
 from sim2real.library.terms import pushes
 from sim2real.records.channels import MEASURED
-from sim2real.records.powers import powers
+from sim2real.records.powers import powers, spin_inertia
 from sim2real.records.reconstruct import reconstruct
 from testbed.flight import fly
 
@@ -79,3 +81,53 @@ def test_a_thrust_coefficient_made_of_what_it_would_explain_says_nothing(absent)
     (term,) = [t for t in bank().terms if (t.component, t.name) == ("sensor:alpha", "CT")]
     (push,) = pushes(flight, [term])
     assert np.any(push.series != 0.0) == (flight.power_from == "throttle")
+
+
+def spun(inertia: float, noise: float, dt: float = 0.02) -> tuple[FlightRecord, np.ndarray]:
+    """A record whose levers' torque steps while its propellers speed up and down, and the power that they absorb."""
+    record = flown()
+    t = record.time
+    omega = 150.0 + 4.0 * np.sin(0.9 * t) + 2.0 * np.sin(0.31 * t)
+    omega_dot = 3.6 * np.cos(0.9 * t) + 0.62 * np.cos(0.31 * t)
+    absorbed = 2.5e5 + 4e4 * np.sin(0.4 * t)
+    row, V, alpha = aircraft.load()[0], record["airspeed"], record["alpha"]
+    per_power = row["propeller_efficiency"] / np.hypot(V * np.cos(alpha), row["propeller_static_speed"])
+    rng, changed = np.random.default_rng(3), {}
+    for side in ("left", "right"):
+        changed[f"rpm_{side}"] = omega * 30.0 / np.pi
+        changed[f"torque_{side}"] = (absorbed + inertia * omega * omega_dot) / omega
+        changed[f"thrust_{side}"] = 1.04 * absorbed * per_power + noise * rng.standard_normal(len(t))
+    return replace(record, channels=record.channels | changed), absorbed
+
+
+@pytest.mark.parametrize("inertia", [8.0, 34.0])
+def test_what_spins_a_propeller_up_does_not_pull(inertia):
+    record, absorbed = spun(inertia, noise=20.0)
+    flight = reconstruct(record)
+    wrong = np.interp(flight.time, record.time - record.time[0],
+                      record["torque_left"] * record["rpm_left"] * np.pi / 30.0 - absorbed)  # fmt: skip
+    left = flight.controls["power_left"] - np.interp(flight.time, record.time - record.time[0], absorbed)
+    inside = slice(50, -50)  # a line through the speed is lopsided at the ends
+    assert np.std(left[inside]) < 0.15 * np.std(wrong[inside])
+    assert any("propellers change their speed" in note for note in flight.notes)
+
+
+def test_power_is_the_torques_where_thrust_says_nothing_of_the_propellers_speed():
+    """Propellers without inertia, thrust that is noise, or thrust that was not recorded."""
+    for record in (spun(0.0, 20.0)[0], spun(34.0, 5e3)[0], without(spun(34.0, 20.0)[0], "thrust")):
+        flight = reconstruct(record)
+        shaft = record["torque_left"] * record["rpm_left"] * np.pi / 30.0
+        told = np.interp(flight.time, record.time - record.time[0], shaft)
+        assert np.abs(flight.controls["power_left"] - told).max() < 1e-3 * told.max()
+        assert not any("propellers" in note for note in flight.notes)
+
+
+@settings(max_examples=30, deadline=None)
+@given(inertia=st.floats(2.0, 80.0), k=st.floats(0.7, 1.3), constant=st.floats(-300.0, 300.0))
+def test_a_propellers_inertia_is_that_of_the_thrust_it_costs(inertia, k, constant):
+    t = np.arange(0.0, 40.0, 0.02)
+    shaft, change = 3e5 + 6e4 * np.sin(0.5 * t), 900.0 * np.cos(0.9 * t)
+    per_power = 0.82 / np.hypot(65.0 + np.sin(0.2 * t), 42.6)
+    thrust = k * (shaft - inertia * change) * per_power + constant
+    assert spin_inertia(thrust, shaft, change, per_power) == pytest.approx(inertia, rel=1e-6)
+    assert spin_inertia(thrust + 2.0 * k * inertia * change * per_power, shaft, change, per_power) == 0.0  # less than 0

@@ -62,6 +62,16 @@ def test_places_are_those_whose_forces_and_moments_differ(found):
     assert found.unknown["places"]["yawing_moment"] < 1.0
 
 
+def test_terms_are_flown_as_large_as_they_are_told(found):
+    """By no factor of an effect that changes the same derivative, whichever was fitted first."""
+    values = found.details.change.values
+    row, told = effects.with_effects(load(), values), values["discrepancy"]
+    assert "lift_slope" in values and "dihedral_effect" in values
+    for term, number in (("CZ_alpha_alpha", "CZ_alpha2"), ("CY_alpha_beta", "CY_alpha_beta"),
+                         ("Cl_alpha_beta", "Cl_alpha_beta"), ("Cl_alpha_p", "Cl_alpha_p")):  # fmt: skip
+        assert told[term] != 0.0 and row[number] == pytest.approx(told[term]), term
+
+
 def test_the_gap_closes_on_a_record_that_was_not_used(found):
     assert found.gap["held_out"]["before"] > 0.5
     assert found.gap["held_out"]["closure"] > 0.8

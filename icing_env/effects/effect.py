@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from icing_env.discrepancy import CHANGES_OF
 from icing_env.types import MEASUREMENT_FIELDS
 
 Component = Literal["aerodynamics", "propulsion", "mass", "actuator", "sensor", "environment"]
@@ -66,3 +67,9 @@ class Effect:
     def typical(self) -> dict[str, float]:
         """Values of a size met in practice."""
         return {p.name: p.typical for p in self.parameters}
+
+
+def multiply(p: NDArray, derivative: str, factor: float | NDArray[np.float64]) -> None:
+    """Multiply a derivative of a PARAMETERS array by a factor, alike in every condition."""
+    for name in (derivative, *CHANGES_OF.get(derivative, ())):
+        p[name] *= factor

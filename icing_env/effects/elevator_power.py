@@ -2,12 +2,12 @@
 
 from numpy.typing import NDArray
 
-from icing_env.effects.effect import Effect, Parameter, Values
+from icing_env.effects.effect import Effect, Parameter, Values, multiply
 
 
 def apply(p: NDArray, values: Values) -> None:
-    p["Cm_elevator"] *= 1.0 + values["change"]
-    p["CZ_elevator"] *= 1.0 + values["change"]
+    multiply(p, "Cm_elevator", 1.0 + values["change"])
+    multiply(p, "CZ_elevator", 1.0 + values["change"])
 
 
 EFFECT = Effect(

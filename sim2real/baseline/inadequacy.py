@@ -26,15 +26,16 @@ from sim2real.signatures.tempering import total
 BATCHES = (100, 30, 10, 4)  # into which a flight is cut
 CHANCE = 1e-3  # that white noise has such a ratio
 WALKS = (1.0, 3.0, 10.0, 30.0, 100.0)  # times `kalman.WALK`
+OF_REFERENCES = WALKS[:-1]  # more of it would pass for gusts, or gusts for it
 
 
 def walk(flights: Sequence[Reconstruction]) -> float:
-    """The likeliest of WALKS, whatever the gusts of each flight."""
+    """The likeliest of OF_REFERENCES, whatever the gusts of each flight."""
     scores = []
-    for times in WALKS:
+    for times in OF_REFERENCES:
         disturbed = [replace(f, inadequacy=replace(f.inadequacy, walk=times)) for f in flights]
         scores.append(sum(max(likelihoods(f, gains(f, SIGMAS))) for f in disturbed))
-    return WALKS[int(np.argmax(scores))]
+    return OF_REFERENCES[int(np.argmax(scores))]
 
 
 def colour(evidences: Sequence[Evidence]) -> tuple[dict[str, float], dict[str, float]]:

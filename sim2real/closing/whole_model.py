@@ -143,6 +143,7 @@ def fit_whole_model(flights: Sequence[Reconstruction], candidates: Bank, posteri
     values = Values()
     for number, change in zip(numbers, size, strict=True):
         values.setdefault(number.effect, effects.get(number.effect).neutral())[number.parameter] = float(change)
+    values["discrepancy"] = values.pop("discrepancy")  # last: terms are as large as told, by no effect's factor
     places = _places(flights, values)
     surest = [i for i in np.argsort(-np.abs(size) / error) if abs(size[i]) > SHOWN * error[i]
               and abs(x[i]) > PLAIN and places.get(_place(numbers[i].move), 1.0) > SEEN]  # fmt: skip

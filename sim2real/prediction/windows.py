@@ -141,6 +141,9 @@ def null_residuals(flight: Reconstruction, parameters: NDArray, windows: Windows
                    repeats: int, seed: int) -> FloatArray:
     """The same for synthetic records of the model itself, with noise and gusts alone, blank where the record is.
 
+    A model far from the aircraft does not stay in the air under its controls: a window in which it departs by more than
+    FARTHEST says nothing of noise and gusts, and is blank.
+
     Returns:
         [repeats, windows, samples, channels], in tolerances.
     """
@@ -150,6 +153,7 @@ def null_residuals(flight: Reconstruction, parameters: NDArray, windows: Windows
     made[blank] = np.nan
     found = estimate_start(flight, rows, first, made, windows.start)
     left = (made - fly(flight, rows, first, found, windows.length)) / _TOLERANCE
+    left[(~blank & ~(np.abs(left) < FARTHEST)).any(axis=(1, 2))] = np.nan
     return left.reshape(repeats, len(windows.first), windows.length, -1)
 
 

@@ -1,9 +1,9 @@
 """Shaft powers that drive the model along a record: from what tells them best.
 
-Torque where recorded; else thrust, through the propeller's chart; else the levers, through the engines' spool, with a
-chart between lever and power that is uncertain (`candidates.nuisances`); else what the recorded axial acceleration
-asks for beside the model's own drag. That acceleration is then no longer there to be compared, and nothing that a
-thrust may do as well can be told.
+Torque where recorded, less what spins a propeller up; else thrust, through the propeller's chart; else the levers,
+through the engines' spool, with a chart between lever and power that is uncertain (`candidates.nuisances`); else what
+the recorded axial acceleration asks for beside the model's own drag. That acceleration is then no longer there to be
+compared, and nothing that a thrust may do as well can be told.
 """
 
 from __future__ import annotations
@@ -13,13 +13,15 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.signal import lfilter, savgol_filter
 
 from icing_env.atmosphere import density, pressure
 from icing_env.propulsion import power_available
 from icing_env.record import FloatArray
 
 SIDES = ("left", "right")
+SPIN = 1.0  # s, over which a line through the propeller's speed tells how it changes
+EXPLAINS = 0.5  # of what recorded thrust has beside recorded power, that spinning up has to explain (assumed)
 Powers = dict[str, FloatArray]
 
 
@@ -37,8 +39,7 @@ def powers(row: NDArray, values: Mapping[str, FloatArray], altitude: FloatArray,
     p = row[0]
     per_power = thrust_per_power(p, values["airspeed"], values["alpha"])
     if all(f"torque_{s}" in values for s in SIDES):
-        rpm = {s: values.get(f"rpm_{s}", np.full(len(altitude), p["propeller_rpm"])) for s in SIDES}
-        return "torque", {f"power_{s}": values[f"torque_{s}"] * rpm[s] * math.pi / 30.0 for s in SIDES}
+        return "torque", _shaft_powers(p, values, per_power, dt, notes)
     if all(f"thrust_{s}" in values for s in SIDES):
         notes.append("torque not recorded: power from the recorded thrust")
         return "thrust", {f"power_{s}": values[f"thrust_{s}"] / per_power for s in SIDES}
@@ -49,6 +50,47 @@ def powers(row: NDArray, values: Mapping[str, FloatArray], altitude: FloatArray,
                             for s in SIDES}  # fmt: skip
     notes.append("thrust, torque and levers not recorded: the power that the axial acceleration asks for")
     return "balance", {f"power_{s}": 0.5 * _balancing(p, values, altitude) / per_power for s in SIDES}
+
+
+def _shaft_powers(p: NDArray, values: Mapping[str, FloatArray], per_power: FloatArray, dt: float,
+                  notes: list[str]) -> Powers:  # fmt: skip
+    """Torque times speed, less J omega domega/dt of propellers that change their speed, where thrust tells J."""
+    n = len(per_power)
+    speed = [values.get(f"rpm_{s}", np.full(n, p["propeller_rpm"])) * math.pi / 30.0 for s in SIDES]
+    shaft = [values[f"torque_{s}"] * omega for s, omega in zip(SIDES, speed, strict=True)]
+    spun = [_spinning_up(omega, dt) for omega in speed]
+    inertia = 0.0
+    if all(f"thrust_{s}" in values for s in SIDES) and any(change.any() for change in spun):
+        thrust = np.concatenate([values[f"thrust_{s}"] for s in SIDES])
+        inertia = spin_inertia(thrust, np.concatenate(shaft), np.concatenate(spun), np.tile(per_power, len(SIDES)))
+    if inertia > 0.0:
+        notes.append(f"propellers change their speed: each takes up power as {inertia:.0f} kg m2, by recorded thrust")
+    return {f"power_{s}": own - inertia * change for s, own, change in zip(SIDES, shaft, spun, strict=True)}
+
+
+def _spinning_up(omega: FloatArray, dt: float) -> FloatArray:
+    """Power that a propeller of 1 kg m2 takes up as its speed [rad/s] changes, W (N,)."""
+    length = 2 * max(1, round(0.5 * SPIN / dt)) + 1
+    if length > len(omega) or not np.ptp(omega):
+        return np.zeros(len(omega))
+    return np.asarray(omega * savgol_filter(omega, length, 1, deriv=1, delta=dt))
+
+
+def spin_inertia(thrust: FloatArray, shaft: FloatArray, spun: FloatArray, per_power: FloatArray) -> float:
+    """Moment of inertia of a propeller with what turns with it, kg m2: thrust = k (shaft - J spun) per_power + c.
+
+    Zero where that explains less than EXPLAINS of what k and c leave of the thrust.
+
+    Args:
+        thrust, shaft: recorded, N and W (N,).
+        spun: power that 1 kg m2 takes up, W (N,).
+        per_power: of the propeller's chart, N/W (N,).
+    """
+    columns = np.column_stack([shaft * per_power, np.ones(len(shaft)), spun * per_power])
+    without, all_of_it = (np.linalg.lstsq(columns[:, :c], thrust, rcond=None)[0] for c in (2, 3))
+    left, least = (float(np.sum((thrust - columns[:, : len(w)] @ w) ** 2)) for w in (without, all_of_it))
+    inertia = -float(all_of_it[2] / all_of_it[0])
+    return inertia if inertia > 0.0 and left - least > EXPLAINS * left else 0.0
 
 
 def thrust_per_power(p: NDArray, airspeed: FloatArray, alpha: FloatArray) -> FloatArray:
