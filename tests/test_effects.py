@@ -165,6 +165,7 @@ def test_a_derivative_that_is_weaker_is_so_in_every_condition(name: str) -> None
     weaker = with_effects(bent, {name: {"change": -0.25}})
     touched = {n for n in PARAMETERS.names if weaker[n] != bent[n]}
     assert touched == touched_by(name) | {n for d in touched_by(name) for n in CHANGES_OF.get(d, ())}
+    assert touched > touched_by(name)
     assert all(weaker[n] == pytest.approx(0.75 * bent[n]) for n in touched)
 
 

@@ -1,5 +1,9 @@
 """JSBSim as the aircraft: signs and units of its records, changes where they should be, what references make of it."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,18 +13,20 @@ from sim2real.baseline.references import fit_baseline
 from sim2real.closing import gap
 from sim2real.closing.remedy import Remedy
 from sim2real.library.candidates import bank
+from sim2real.prediction.kalman import gains
 from sim2real.records.powers import spin_inertia, thrust_per_power
 from sim2real.records.reconstruct import Reconstruction, reconstruct
+from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
 from testbed import cli
-from testbed.withheld import instruments
+from testbed.withheld import gusts, instruments
 from testbed.withheld import plant as pl
 from testbed.withheld.files import record_text
-from testbed.withheld.jsbsim_cases import aircraft, designs, side_text, without_levers
+from testbed.withheld.jsbsim_cases import TAIL_ARM, aircraft, designs, side_text, without_levers
 from testbed.withheld.jsbsim_changes import BY_NAME
 from testbed.withheld.jsbsim_edit import AERO, data_root
 from testbed.withheld.jsbsim_flight import Aircraft, Flight, fly
 from testbed.withheld.jsbsim_score import figures, flat
-from testbed.withheld.manoeuvres import DEG, PLANS, Manoeuvre
+from testbed.withheld.manoeuvres import DEG, PLANS, Manoeuvre, inputs
 
 ROOT = data_root()
 needs_jsbsim = pytest.mark.skipif(ROOT is None, reason="JSBSim's DHC6 is not installed: pip install jsbsim")
@@ -145,18 +151,35 @@ def test_a_propellers_inertia_is_that_of_its_file(pulses: Flight) -> None:
     assert found == pytest.approx(25.1034 * 1.35582, rel=0.1)
 
 
-@pytest.fixture(scope="module")
-def clean(tmp_path_factory) -> list[Reconstruction]:
-    """Two flights of the clean aircraft in still air, slow and fast."""
+def reconstructed(folder: Path, plans: Sequence[int], sigma: float) -> list[Reconstruction]:
+    """Flights of the clean aircraft by some manoeuvres of the first plan, in gusts of `sigma` m/s."""
     assert ROOT is not None
-    plane, folder, flights = aircraft(ROOT), tmp_path_factory.mktemp("clean"), []
-    for i in (0, 1):
-        flight = fly(plane, PLANS[0][i])
-        channels = instruments.read(flight.channels, 1.0, np.random.default_rng(i))
+    plane, flights = aircraft(ROOT), []
+    for i in plans:
+        manoeuvre, rng = PLANS[0][i], np.random.default_rng(i)
+        gust = gusts.draw(len(inputs(manoeuvre)) - 1, sigma, 1.0, manoeuvre.speed, TAIL_ARM, rng)
+        flight = fly(plane, manoeuvre, 1.0, gust)
+        channels = instruments.read(flight.channels, 1.0, rng)
         (folder / f"{i}.csv").write_text(without_levers(record_text(channels, flight.commands)))
         (folder / f"{i}.toml").write_text(side_text("x", "reference", flight.papers))
         flights.append(reconstruct(read(folder / f"{i}.csv")))
     return flights
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory) -> list[Reconstruction]:
+    """Two flights in still air, slow and fast."""
+    return reconstructed(tmp_path_factory.mktemp("clean"), (0, 1), 0.0)
+
+
+@needs_jsbsim
+def test_gusts_that_references_met_are_told_beside_what_the_model_lacks(tmp_path) -> None:
+    """More process noise than the model needs would take them: 0.5 m/s was told as 0.003 to 0.3."""
+    flights = reconstructed(tmp_path, (0, 1), 0.5)
+    found = fit_baseline(flights, bank())
+    for flight in flights:
+        over = replace(reconstruct(flight.record, found.near(flight.record)), inadequacy=found.inadequacy)
+        assert 0.35 < choose_gain(over, gains(over, SIGMAS)).sigma < 0.75
 
 
 @needs_jsbsim
