@@ -77,7 +77,8 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
         "numbers": published.digest(), "count": cases, "development_seed": seed if known else None} | (
         {"strangers": True} if strangers else {}) | ({"spread": spread} if spread != SPREAD else {})
     if (out / "manifest.json").is_file() and files.read_json(out / "manifest.json") != sealed:
-        raise ValueError(f"{out}: what was drawn is not what its manifest tells: another generator, or other versions")
+        raise ValueError(f"{out}: what was drawn is not what its manifest tells: another generator, processor or "
+                         "other versions")
     files.write_text(out / "manifest.json", json.dumps(sealed, indent=1))
     return sealed
 
