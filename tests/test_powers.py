@@ -14,7 +14,7 @@ from sim2real.diagnosis import diagnose
 from sim2real.library.candidates import bank, not_testable
 from sim2real.library.terms import pushes
 from sim2real.records.channels import MEASURED
-from sim2real.records.powers import powers, spin_inertia
+from sim2real.records.powers import powers, spin_inertia, thrust_per_power
 from sim2real.records.reconstruct import reconstruct
 from testbed.flight import fly
 
@@ -83,15 +83,14 @@ def test_a_thrust_coefficient_made_of_what_it_would_explain_says_nothing(absent)
     assert np.any(push.series != 0.0) == (flight.power_from == "throttle")
 
 
-def spun(inertia: float, noise: float, dt: float = 0.02) -> tuple[FlightRecord, np.ndarray]:
-    """A record whose levers' torque steps while its propellers speed up and down, and the power that they absorb."""
+def spun(inertia: float, noise: float) -> tuple[FlightRecord, np.ndarray]:
+    """A record whose propellers speed up and down, and the power that each absorbs."""
     record = flown()
     t = record.time
     omega = 150.0 + 4.0 * np.sin(0.9 * t) + 2.0 * np.sin(0.31 * t)
     omega_dot = 3.6 * np.cos(0.9 * t) + 0.62 * np.cos(0.31 * t)
     absorbed = 2.5e5 + 4e4 * np.sin(0.4 * t)
-    row, V, alpha = aircraft.load()[0], record["airspeed"], record["alpha"]
-    per_power = row["propeller_efficiency"] / np.hypot(V * np.cos(alpha), row["propeller_static_speed"])
+    per_power = thrust_per_power(aircraft.load()[0], record["airspeed"], record["alpha"])
     rng, changed = np.random.default_rng(3), {}
     for side in ("left", "right"):
         changed[f"rpm_{side}"] = omega * 30.0 / np.pi

@@ -97,15 +97,14 @@ def by_channel(energy: FloatArray) -> dict[str, float]:
 def g(energy: FloatArray, alone: FloatArray) -> float:
     """Gap of windows [windows, channels] above that of noise and gust alone [..., windows, channels]."""
     mine = _channel_mean(energy)
-    found = _channel_mean(alone.reshape(-1, *energy.shape))
-    known = np.isfinite(found)  # where the model itself stays in the air
-    theirs = np.where(known, found, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    repeats = _channel_mean(alone.reshape(-1, *energy.shape))
+    theirs = np.nan_to_num(_channel_mean(repeats))  # of those in which the model itself stays in the air
     excess = np.maximum(mine - theirs, 0.0)
     return float(np.sqrt(np.mean(excess[np.isfinite(excess)])))
 
 
 def _channel_mean(energy: FloatArray) -> FloatArray:
-    """Mean over windows [..., windows, channels]; nan where a channel has none."""
+    """Mean over windows (or repeats) [..., windows, channels]; nan where a channel has none."""
     known = np.isfinite(energy)
     count = known.sum(axis=-2)
     return np.asarray(np.where(count > 0, np.where(known, energy, 0.0).sum(axis=-2) / np.maximum(count, 1), np.nan))
