@@ -13,7 +13,7 @@ from icing_env import aircraft
 from icing_env import effects as library
 from icing_env.simulate import Fleet
 from sim2real.records.channels import TOLERANCE
-from testbed.withheld import described, effects, manoeuvres, refly
+from testbed.withheld import compiled, described, effects, manoeuvres, refly
 from testbed.withheld import plant as pl
 from testbed.withheld.flights import Aircraft, Flown, fly
 from testbed.withheld.instruments import FAST
@@ -123,3 +123,14 @@ def test_the_generator_and_the_scorer_load_nothing_of_the_project():
             "print([m for m in sys.modules if m.split('.')[0] in ('icing_env','sim2real','estimators','controllers')])")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_change_of_any_source_is_compiled_anew(tmp_path):
+    (tmp_path / "plant.py").write_text("x = 1\n")
+    before = compiled.folder(tmp_path)
+    compiled.folder.cache_clear()
+    assert compiled.folder(tmp_path) == before
+    (tmp_path / "plant.py").write_text("x = 2\n")
+    compiled.folder.cache_clear()
+    assert compiled.folder(tmp_path) != before
+    assert pl.fly._cache.cache_path.startswith(compiled.folder())

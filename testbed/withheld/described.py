@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
+from testbed.withheld.compiled import compiled
 
 # Neutral at 0.
 DESCRIBED = (
@@ -25,7 +25,7 @@ OWN = ("CZ_beta2", "CZ_alphadot", "Cm_aileron", "Cm_beta2", "Cm_p", "CY_aileron"
 CENTRED, CENTRE = {"Cm_alpha_q": "Cm_q", "CY_alpha_rudder": "CY_rudder", "Cl_alpha_p": "Cl_p"}, 0.03
 
 
-@njit(cache=True)
+@compiled
 def described(p: Any, t: float, V: float, a: float, b: float, ph: float, qh: float, rh: float, de: float, da: float,
               dr: float, ct: float, bdot: float, bank: float, nose: float) -> tuple[float, ...]:  # fmt: skip
     """CX, CY, CZ, Cl, Cm, Cn.

@@ -12,12 +12,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_lyapunov, solve_discrete_are
 
 from testbed.withheld import gusts, instruments, trim
 from testbed.withheld import plant as pl
+from testbed.withheld.compiled import compiled
 from testbed.withheld.flights import Flown
 from testbed.withheld.published import PUBLISHED, airframe
 
@@ -144,7 +144,7 @@ def _assembled(Fx: NDArray, Qx: NDArray, gamma: NDArray, Cy: NDArray, Dy: NDArra
                     np.linalg.inv(np.linalg.cholesky(innovation)), starts)  # fmt: skip
 
 
-@njit(cache=True)
+@compiled
 def _filtered(y: NDArray, drive: NDArray, x: NDArray, F: NDArray, K: NDArray, M: NDArray, root: NDArray) -> NDArray:
     out = np.empty_like(y)
     for k in range(y.shape[0]):
@@ -166,7 +166,7 @@ def whiten(w: Whitener, y: NDArray, u: NDArray, x0: NDArray | None = None) -> ND
     return np.asarray(_filtered(*arrays)).reshape(-1, y.shape[2])
 
 
-@njit(cache=True)
+@compiled
 def _follow(u: NDArray, start: NDArray, p: NDArray) -> NDArray:
     """Positions of the published actuators and spools behind recorded commands [samples, 5] (power over its top)."""
     out = np.empty((len(u), 5))

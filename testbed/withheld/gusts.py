@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, expm, solve_continuous_lyapunov
 from scipy.signal import lfilter
 
+from testbed.withheld.compiled import compiled
 from testbed.withheld.plant import DT, SUB
 
 LENGTH = 1750.0 * 0.3048  # m
@@ -43,7 +43,7 @@ def discrete(A: NDArray, B: NDArray, step: float) -> tuple[NDArray, NDArray]:
     return np.ascontiguousarray(F), 0.5 * (Q + Q.T)
 
 
-@njit(cache=True)
+@compiled
 def _march(F: NDArray, noise: NDArray, x: NDArray) -> NDArray:
     out = np.empty((noise.shape[0] + 1, len(x)))  # C order, as F and noise are
     out[0] = x

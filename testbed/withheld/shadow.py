@@ -13,12 +13,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from testbed.withheld import distance, instruments
 from testbed.withheld import plant as pl
+from testbed.withheld.compiled import compiled
 from testbed.withheld.flights import Aircraft, Flown
 from testbed.withheld.trim import ALTITUDE
 
@@ -26,7 +26,7 @@ MOTION = np.array([pl.H, pl.U, pl.V, pl.W, pl.PHI, pl.THETA, pl.PSI, pl.P, pl.Q,
 SETTLE = 500  # samples that surfaces and spools get to settle at the first command
 
 
-@njit(cache=True)
+@compiled
 def _along(row: Any, Y: Any, C: Any, motion: Any, settle: int) -> tuple[Any, Any, Any]:
     """States [N, 27] with `motion` from Y and the rest its own, outputs [N, 9] there, errors of arrival [N, 27].
 

@@ -15,11 +15,11 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from testbed.withheld import instruments
 from testbed.withheld import plant as pl
+from testbed.withheld.compiled import compiled
 from testbed.withheld.distance import MOTION
 from testbed.withheld.draw import published_spread
 from testbed.withheld.flights import Aircraft, Flown, recorded
@@ -53,7 +53,7 @@ def held(flown: Flown, read: Mapping[str, NDArray]) -> Held:
     return Held(np.column_stack([read[name] for name in MOTION]), flown.states, flown.commands)
 
 
-@njit(cache=True)
+@compiled
 def _glide(row: Any, starts: Any, commands: Any, first: Any, steps: int) -> tuple[Any, Any]:
     """States [rows, steps + 1, 27] and outputs [rows, steps + 1, 9] from sample `first` of each row on, still air."""
     p = row[0]
