@@ -102,9 +102,15 @@ def stationary_lag(x1: float, x2: float, time: float, time_lag: float, sigma: fl
 
 
 @kernel
+def roll_time(span: float, airspeed: float) -> float:
+    """Time constant (s) of the rolling gust, and of the lag behind w that makes the pitching one."""
+    return 4.0 * span / (math.pi * airspeed)
+
+
+@kernel
 def roll_spectrum(sigma: float, length: float, span: float, airspeed: float) -> tuple[float, float]:
     """Standard deviation (rad/s) and time constant (s) of the rolling gust."""
-    time = 4.0 * span / (math.pi * airspeed)
+    time = roll_time(span, airspeed)
     density = 0.8 * math.pow(0.25 * math.pi * length / span, 1.0 / 3.0) / (length * airspeed)
     return sigma * math.sqrt(density * 0.5 * math.pi / time), time
 
@@ -130,11 +136,18 @@ def add_discrete(s: Any, p: Any, airspeed: float, dt: float) -> None:
 
 
 @kernel
+def stay_level(s: Any) -> None:
+    """No rotation of the air."""
+    s.dryden_p = s.dryden_q = s.dryden_r = 0.0
+    s.gust_p = s.gust_q = s.gust_r = 0.0
+
+
+@kernel
 def calm(s: Any) -> None:
     """No turbulence: states and gusts exactly zero, the tail's gust left to its delay."""
     s.dryden_u = s.dryden_v1 = s.dryden_v2 = s.dryden_w1 = s.dryden_w2 = 0.0
-    s.dryden_p = s.dryden_q = s.dryden_r = 0.0
-    s.gust_u = s.gust_v = s.gust_w = s.gust_p = s.gust_q = s.gust_r = 0.0
+    s.gust_u = s.gust_v = s.gust_w = 0.0
+    stay_level(s)
 
 
 @kernel
@@ -148,7 +161,6 @@ def put_translation(s: Any) -> None:
 @kernel
 def put_rotation(s: Any, p: Any, airspeed: float) -> None:
     """Gust rotations: the derivative of w and v along the path, by the lags whose states are dryden_q, dryden_r."""
-    s.gust_p = s.dryden_p
     s.gust_q = -math.pi / (4.0 * p.span) * (transverse(s.dryden_w1, s.dryden_w2) - s.dryden_q)
     s.gust_r = math.pi / (3.0 * p.span) * (transverse(s.dryden_v1, s.dryden_v2) - s.dryden_r)
 
@@ -180,13 +192,19 @@ def advance_translation(s: Any, sigma: float, airspeed: float, dt: float) -> Non
 
 
 @kernel
-def advance_rotation(s: Any, p: Any, airspeed: float, dt: float, v_before: float, w_before: float) -> None:
-    """Advance the rolling gust and the lags behind w and v, after the translation; then gust_p, gust_q, gust_r."""
-    length_w = scales(s.altitude)[1]
-    sigma_p, time_p = roll_spectrum(p.turbulence_sigma_w, length_w, p.span, airspeed)
+def advance_roll(s: Any, p: Any, airspeed: float, dt: float) -> None:
+    """Advance the rolling gust, after the translation."""
+    sigma_p, time_p = roll_spectrum(p.turbulence_sigma_w, scales(s.altitude)[1], p.span, airspeed)
     decay = math.exp(-dt / time_p)
     n = normal(uniform(words4(s.seed, STREAM_TURBULENCE, s.step, BLOCK[1])[0]))
     s.dryden_p = decay * s.dryden_p + sigma_p * math.sqrt(1.0 - decay * decay) * n
+    s.gust_p = s.dryden_p
+
+
+@kernel
+def follow_path(s: Any, p: Any, airspeed: float, dt: float, v_before: float, w_before: float) -> None:
+    """Advance the lags behind w and v, after the translation; then gust_q, gust_r."""
+    time_p = roll_time(p.span, airspeed)
     w_after, v_after = transverse(s.dryden_w1, s.dryden_w2), transverse(s.dryden_v1, s.dryden_v2)
     s.dryden_q = lag(s.dryden_q, w_before, w_after, dt / time_p)
     s.dryden_r = lag(s.dryden_r, v_before, v_after, dt / (0.75 * time_p))
@@ -211,11 +229,19 @@ def drift_translation(s: Any, airspeed: float, dt: float) -> None:
 
 @kernel
 def drift_turbulence(s: Any, p: Any, airspeed: float, dt: float) -> None:
-    """`advance_turbulence` as a predictor sees it: nothing is drawn, the tail meets the gust later."""
+    """`advance_turbulence` as a predictor sees it: nothing is drawn."""
     v, before = max(airspeed, LOWEST_AIRSPEED), s.gust_w
+    v_before, w_before = transverse(s.dryden_v1, s.dryden_v2), transverse(s.dryden_w1, s.dryden_w2)
     drift_translation(s, v, dt)
     put_translation(s)
-    reach_tail(s, p, v, before, dt)
+    if p.turbulence_tail_delay != 0.0:
+        stay_level(s)
+        reach_tail(s, p, v, before, dt)
+        return
+    s.dryden_p *= math.exp(-dt / roll_time(p.span, v))
+    s.gust_p = s.dryden_p
+    follow_path(s, p, v, dt, v_before, w_before)
+    s.gust_w_tail = s.gust_w
 
 
 @kernel
@@ -243,9 +269,10 @@ def advance_turbulence(s: Any, p: Any, airspeed: float, dt: float) -> None:
         advance_translation(s, p.turbulence_sigma_w, v, dt)
         put_translation(s)
         if delayed:
-            s.gust_p = s.gust_q = s.gust_r = 0.0
+            stay_level(s)
         else:
-            advance_rotation(s, p, v, dt, v_before, w_before)
+            advance_roll(s, p, v, dt)
+            follow_path(s, p, v, dt, v_before, w_before)
     else:
         calm(s)
     add_discrete(s, p, v, dt)
@@ -273,7 +300,7 @@ def start_turbulence(s: Any, p: Any, airspeed: float) -> None:
     s.gust_w_tail = s.gust_w
     if p.turbulence_tail_delay == 0.0:
         sigma_p, time_p = roll_spectrum(sigma, length_w, p.span, v)
-        s.dryden_p = sigma_p * n5
+        s.dryden_p = s.gust_p = sigma_p * n5
         s.dryden_q = stationary_lag(s.dryden_w1, s.dryden_w2, length_w / v, time_p, sigma, n6)
         s.dryden_r = stationary_lag(s.dryden_v1, s.dryden_v2, length_uv / v, 0.75 * time_p, ratio * sigma, n7)
         put_rotation(s, p, v)

@@ -15,6 +15,7 @@ from sim2real.closing.remedy import Remedy, leading, remedy
 from sim2real.closing.whole_model import WholeModel
 from sim2real.library.candidates import Bank
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
+from sim2real.prediction.gusts import Gusts
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.records.side_by_side import each
 from sim2real.signatures.evidence import Evidence
@@ -72,14 +73,14 @@ def changed(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequ
         progress: told what is being done.
     """
     told = _told(flights, candidates, evidences, baseline, posterior, progress)
-    alone, sigmas = remedy(told.explained, told.flown), [e.sigma_w for e in evidences]
+    alone, gusts = remedy(told.explained, told.flown), [e.gusts for e in evidences]
     progress("flying the records freely, before and after")
-    left = flown_freely(flights, sigmas, alone, seed)
+    left = flown_freely(flights, gusts, alone, seed)
     if any_aircraft and whole_model.suspected(posterior, baseline.precision):
         judged = _judged(flights, told, alone, left, candidates)
         all_of_it = (told.flown is None or bool(told.flown.values)) and not posterior.best.varies
         if whole_model.incomplete(posterior, baseline.precision, judged, all_of_it):
-            whole = _whole(flights, candidates, posterior, told, sigmas, judged, seed, progress)
+            whole = _whole(flights, candidates, posterior, told, gusts, judged, seed, progress)
             if whole is not None:
                 return whole
     flown = flown_parts(flights, left, told.explained, told.flown, candidates.nuisances)
@@ -97,12 +98,12 @@ def _judged(flights: Sequence[Reconstruction], told: Told, alone: Remedy, left: 
 
 
 def _whole(flights: Sequence[Reconstruction], candidates: Bank, posterior: Posterior, told: Told,
-           sigmas: Sequence[float], judged: gap.Energy, seed: int, progress: Progress) -> Changed | None:  # fmt: skip
+           gusts: Sequence[Gusts], judged: gap.Energy, seed: int, progress: Progress) -> Changed | None:  # fmt: skip
     """All numbers of the model changed; None where that takes no more of the gap than what was found before."""
     progress("fitting all numbers of the model, since what was found is not all")
     whole = whole_model.fit_whole_model(flights, candidates, posterior)
     everything = whole.remedy()
-    closer = flown_freely(flights, sigmas, everything, seed)
+    closer = flown_freely(flights, gusts, everything, seed)
     if not whole_model.takes_most(judged, closer):
         return None
     posterior = whole_model.with_whole_model(posterior, whole)
@@ -127,7 +128,7 @@ def _told(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequen
     return Told(explained, unknown, form)
 
 
-def flown_freely(flights: Sequence[Reconstruction], sigmas: Sequence[float], change: Remedy, seed: int) -> gap.Energy:
+def flown_freely(flights: Sequence[Reconstruction], gusts: Sequence[Gusts], change: Remedy, seed: int) -> gap.Energy:
     """Energies of all records under the model and under the model changed."""
-    return gap.together(each(lambda i, f, sigma: gap.energies(f, change, sigma, seed + SEEDS_APART * i, change.paths),
-                             range(len(flights)), flights, sigmas))
+    return gap.together(each(lambda i, f, own: gap.energies(f, change, own, seed + SEEDS_APART * i, change.paths),
+                             range(len(flights)), flights, gusts))

@@ -28,11 +28,12 @@ from sim2real.over_time.history import SAME, History, histories
 from sim2real.planning.limits import limits
 from sim2real.planning.manoeuvre import next_manoeuvre
 from sim2real.posterior.hypotheses import Posterior
+from sim2real.prediction.gusts import Gusts
 from sim2real.records.instruments import with_recorder
 from sim2real.records.reconstruct import Reconstruction, reconstruct
 from sim2real.records.side_by_side import algebra_in_one_thread
 from sim2real.rollout import Rollout, flying_as
-from sim2real.signatures.evidence import Evidence
+from sim2real.signatures.evidence import Evidence, typical
 from sim2real.weigh import Progress, fit
 from sim2real.where import components, regimes
 
@@ -103,8 +104,8 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     sizes = _over_time(replace(at_hand, baseline=baseline), evidences, found, progress)
     progress("flying what these records could have revealed")
     shown = limits(evidences, candidates, baseline, posterior.tempering, posterior.fits)
-    sigma = float(np.mean([e.sigma_w for e in evidences]))
-    tested, less = _held_out(others, flown, sigma, seed) if others else (None, None)
+    gusts = typical(evidences)
+    tested, less = _held_out(others, flown, gusts, seed) if others else (None, None)
     closes = {"training": _closed(flown), "held_out": gap.held_out(tested, seed, less)}
     if climb and tested is not None and less is not None:
         closes["ladder"] = ladder(flights, others, candidates, baseline, evidences, posterior, explained,
@@ -125,7 +126,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         detection_limits=detection_limits(posterior.fits, shown),
         unknown=None if lacking is None else lacking.answer(),
         gap=closes,
-        next_manoeuvre=_next(flights[0], candidates, posterior, hypotheses, sigma, baseline.precision),
+        next_manoeuvre=_next(flights[0], candidates, posterior, hypotheses, gusts.sigma, baseline.precision),
         resimulate=resimulation(flown.change, flown.training, flights, evidences),
         data_problems=problems((*flights, *others)),
         provenance=provenance(flights, others, evidences, at_hand.without, len(reference), seed)
@@ -179,10 +180,10 @@ def _over_time(at_hand: _AtHand, evidences: Sequence[Evidence], found: Changed, 
                      remedy(explained, found.told.flown), found.told.flown)
 
 
-def _held_out(others: Sequence[Reconstruction], flown: Flown, sigma: float, seed: int
+def _held_out(others: Sequence[Reconstruction], flown: Flown, gusts: Gusts, seed: int
               ) -> tuple[gap.Energy, FloatArray]:  # fmt: skip
     """Held-out records before and after, and what the effects alone leave of them [windows, channels]."""
-    tested = flown_freely(others, [sigma] * len(others), flown.change, seed + 1000)
+    tested = flown_freely(others, [gusts] * len(others), flown.change, seed + 1000)
     alone = flown.change is flown.alone
     return tested, tested.after if alone else gap.of_all(others, flown.alone, flown.change.paths)
 

@@ -26,10 +26,11 @@ from sim2real.closing.remedy import Remedy, remedy
 from sim2real.library.candidates import Bank, not_testable
 from sim2real.posterior.form import home
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
+from sim2real.prediction.gusts import Gusts
 from sim2real.prediction.windows import COMPARED, FREE, fly
 from sim2real.records.channels import MEASURED
 from sim2real.records.reconstruct import Reconstruction
-from sim2real.signatures.evidence import Evidence
+from sim2real.signatures.evidence import Evidence, typical
 from sim2real.weigh import Progress, fit
 
 PIECE = 20.0  # s of a synthetic record: flown open loop, gusts carry it off
@@ -93,9 +94,9 @@ def runner_up(posterior: Posterior, explained: Hypothesis | None) -> Hypothesis:
 def search_on_nothing(flights: Sequence[Reconstruction], others: Sequence[Reconstruction], candidates: Bank,
                       baseline: Baseline, evidences: Sequence[Evidence], seed: int) -> dict[str, Any]:
     """Diagnose synthetic records of the model itself and fly the best explanation, believed or not."""
-    sigma = float(np.mean([e.sigma_w for e in evidences]))
+    gusts = typical(evidences)
     made, tests = ([piece for i, flight in enumerate(records)
-                    for piece in synthetic(flight, sigma, seed + 2000 + start + 50 * i)]
+                    for piece in synthetic(flight, gusts, seed + 2000 + start + 50 * i)]
                    for start, records in ((0, flights), (1000, others)))  # fmt: skip
     untestable = not_testable(made, candidates)
     found, posterior, _ = fit(made, candidates, untestable, baseline, lambda text: None)
@@ -107,7 +108,7 @@ def search_on_nothing(flights: Sequence[Reconstruction], others: Sequence[Recons
             "closure": 1.0 - after / before}
 
 
-def synthetic(flight: Reconstruction, sigma: float, seed: int) -> list[Reconstruction]:
+def synthetic(flight: Reconstruction, gusts: Gusts, seed: int) -> list[Reconstruction]:
     """Records of the model itself under the controls of a record, in pieces, with gusts and the record's noise.
 
     Commands are left out: the positions are recorded ones, and how they follow is no question here.
@@ -117,7 +118,7 @@ def synthetic(flight: Reconstruction, sigma: float, seed: int) -> list[Reconstru
     first = first if len(first) else np.zeros(1, np.intp)
     start = np.column_stack([flight.channel(name)[first] for name in FREE])
     rows = np.repeat(flight.parameters, len(first))
-    y = fly(flight, rows, first, start, length, (max(sigma, 1e-6), seed))
+    y = fly(flight, rows, first, start, length, (gusts, seed))
     out = []
     for i, k in enumerate(first):
         span = slice(k + 1, k + 1 + length)

@@ -55,9 +55,14 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
         Evidence of every record, the posterior, and the baseline with the spread that the records ask for.
     """
     progress("fitting the model's own uncertainty")
-    flights, centre, known = followed(flights, candidates, baseline)
+    rotation = [False] * len(flights)
+    for _ in range(2):  # once more where it shows that the air turns
+        moved, centre, known = followed(flights, candidates, baseline, rotation)
+        guess = first_guess(moved, candidates, baseline, untestable, centre, known)
+        if rotation == (rotation := [gain.gusts.rotation for gain in guess]):
+            break
+    flights = moved
     found = _Weighing(flights, candidates, baseline, untestable, centre)
-    guess = first_guess(flights, candidates, baseline, untestable, centre, known)
     progress(f"flying {candidates.size} variants along {len(flights)} records")
     found.gather(guess)
     found.explain(progress)

@@ -13,7 +13,6 @@ from sim2real.baseline.references import Baseline, fit_baseline
 from sim2real.closing import gap
 from sim2real.closing.remedy import Remedy
 from sim2real.library.candidates import bank
-from sim2real.prediction.kalman import gains
 from sim2real.records.powers import spin_inertia, thrust_per_power
 from sim2real.records.reconstruct import Reconstruction, reconstruct
 from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
@@ -185,7 +184,7 @@ def test_gusts_that_references_met_are_told_beside_what_the_model_lacks(tmp_path
     found = fit_baseline(flights, bank())
     for flight in flights:
         over = replace(reconstruct(flight.record, found.near(flight.record)), inadequacy=found.inadequacy)
-        assert 0.35 < choose_gain(over, gains(over, SIGMAS)).sigma < 0.75
+        assert 0.35 < choose_gain(over, SIGMAS).sigma < 0.75
 
 
 @needs_jsbsim

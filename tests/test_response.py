@@ -10,19 +10,24 @@ import pytest
 from icing_env import scenario
 from sim2real.library.candidates import bank
 from sim2real.library.terms import at_any_time, pushes
+from sim2real.prediction.kalman import follow
 from sim2real.prediction.predictor import Push
 from sim2real.records.reconstruct import reconstruct
 from sim2real.signatures.evidence import Evidence, flown, gather
+from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
 from sim2real.signatures.response import Filter
 from testbed.flight import fly
 
 
-@pytest.fixture(scope="module", params=[0.0, 1.5])
+@pytest.fixture(scope="module", params=[(0.0, False), (1.5, False), (1.5, True)])
 def evidence(request) -> Evidence:
-    chosen = scenario.load("clear_air", duration=25.0, parameters={"turbulence_sigma_w": request.param})
+    sigma, rotation = request.param
+    weather = {"turbulence_sigma_w": sigma, "turbulence_tail_delay": float(not rotation)}
+    chosen = scenario.load("clear_air", duration=25.0, parameters=weather)
     flight = reconstruct(fly(chosen, seed=7, observer=False, protection=False).record)
     flight.measured[1::5, 0] = np.nan  # a reading that is missing now and then
-    return gather(flight, replace(bank(), families=(), terms=(), nuisances=(), size=1))
+    model = replace(bank(), families=(), terms=(), nuisances=(), size=1)
+    return gather(flight, model, follow(flight, choose_gain(flight, SIGMAS, (), rotation)))
 
 
 def both(evidence: Evidence, pushed: tuple[Push, ...]) -> tuple[np.ndarray, np.ndarray]:

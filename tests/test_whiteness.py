@@ -16,7 +16,8 @@ from icing_env.record import read
 from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import _reconstructed
 from sim2real.prediction.as_predicted import as_predicted
-from sim2real.prediction.kalman import _within_steps, follow, gains, gust_noise, linearise, roughness
+from sim2real.prediction.gusts import gust_noise
+from sim2real.prediction.kalman import _within_steps, follow, gains, linearise, roughness
 from sim2real.prediction.predictor import TANGENT, Predictor, innovations
 from sim2real.prediction.readings import apart
 from sim2real.records.channels import FED_BACK, MEASURED
@@ -91,7 +92,7 @@ def test_where_a_channel_is_absent_the_others_innovations_stay_white(tmp_path, l
 def test_channels_that_are_slow_or_stop_are_worth_their_samples(tmp_path, samples):
     """Their noise is that of the samples there are, and where there is none nothing counts."""
     flight = kept(flown(tmp_path, 0.5, 1), samples)
-    gain = choose_gain(flight, gains(flight, SIGMAS))
+    gain = choose_gain(flight, SIGMAS)
     assert 0.3 < gain.sigma < 0.8
     gain = follow(flight, gain)
     left = innovations(flight, flight.parameters, gain.K)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from icing_env.record import FloatArray
 from sim2real.actuators.paths import driven
+from sim2real.prediction.gusts import Gusts
 from sim2real.prediction.windows import COMPARED, Pusher, cut, null_residuals, residuals
 from sim2real.records.reconstruct import Reconstruction
 
@@ -38,12 +39,12 @@ class Energy:
     starts: FloatArray
 
 
-def energies(flight: Reconstruction, change: Change, sigma: float, seed: int, paths: Paths = ()) -> Energy:
+def energies(flight: Reconstruction, change: Change, gusts: Gusts, seed: int, paths: Paths = ()) -> Energy:
     """Residual energy of one record under the model and under the model changed by the diagnosis.
 
     Args:
         change: what the diagnosis changes in PARAMETERS.
-        sigma, seed: gust intensity (m/s) and seed of the synthetic records behind noise and gusts alone.
+        gusts, seed: of the synthetic records behind noise and gusts alone.
         paths: surfaces that follow the recorded commands through the actuator, before and after alike; the others
             are where they were recorded.
     """
@@ -53,7 +54,7 @@ def energies(flight: Reconstruction, change: Change, sigma: float, seed: int, pa
     before = _mean_square(left)
     same = change(base).tobytes() == base.tobytes()
     after = before if same else squares(flight, change, paths)
-    alone = null_residuals(asked, base, windows, start, sigma, REPEATS, seed)
+    alone = null_residuals(asked, base, windows, start, gusts, REPEATS, seed)
     return Energy(before, after, _mean_square(alone), start)
 
 

@@ -17,13 +17,13 @@ from sim2real.library.terms import pushes
 from sim2real.posterior.attribution import nuisance_mean, reduce, with_prior
 from sim2real.posterior.hypotheses import Hypothesis
 from sim2real.prediction.as_predicted import as_predicted
-from sim2real.prediction.kalman import Gain, follow, gains
+from sim2real.prediction.kalman import Gain, follow
 from sim2real.prediction.predictor import Push, innovations
 from sim2real.prediction.readings import slow
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.records.side_by_side import each
 from sim2real.signatures.evidence import Evidence, gather
-from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
+from sim2real.signatures.gust_intensity import SIGMAS, choose_gain, turns
 from sim2real.signatures.tempering import temper, total
 from sim2real.signatures.whitening import whitening
 
@@ -35,16 +35,20 @@ DEPARTED = 1e6  # mean whitened square of a model that does not follow the recor
 MOVED = 4.0  # standard deviations by which the model that variants are flown about is moved at most
 
 
-def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline) -> tuple[FloatArray, list[Gain]]:
+def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline, rotation: Sequence[bool] = ()
+           ) -> tuple[FloatArray, list[Gain]]:  # fmt: skip
     """Nuisances [n] that fit best where there is no gap, and the gains found on the way.
 
     Gauss-Newton, flown anew at every step, gusts judged anew before each. Both are needed together: what derivatives
     that are off make of a record passes for gust, and stronger gusts than there were let derivatives be off by more
     (two standard deviations in 1.5 m/s, where the noise of the instruments is low).
+
+    Args:
+        rotation: along which records the air turns; none if omitted.
     """
     only = replace(candidates, families=(), terms=(), size=1 + len(candidates.nuisances))
     centre = np.zeros(len(candidates.nuisances))
-    known = [_at_first(f) for f in flights]
+    known = each(_at_first, flights, rotation or [False] * len(flights))
     for k in range(SETTLING):
         evidences = gather_about(flights, only, centre, known)
         gram = with_prior(total(evidences), only, baseline.precision, centre)
@@ -58,22 +62,22 @@ def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseli
     return centre, known
 
 
-def _at_first(flight: Reconstruction) -> Gain:
+def _at_first(flight: Reconstruction, rotation: bool) -> Gain:
     """The gain of the record's likeliest gusts, along it where a channel is slow."""
-    found = choose_gain(flight, gains(flight, SIGMAS))
+    found = choose_gain(flight, SIGMAS, (), rotation)
     return follow(flight, found) if slow(flight) else found.with_start()
 
 
-def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline
-             ) -> tuple[list[Reconstruction], FloatArray, list[Gain]]:  # fmt: skip
-    """The records, with the settled model's nuisances [n] and gains.
+def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline,
+             rotation: Sequence[bool] = ()) -> tuple[list[Reconstruction], FloatArray, list[Gain]]:
+    """The records, with the settled model's nuisances [n] and gains; `rotation` as in `settle`.
 
     A model that is no longer corrected enough to keep to a record departs from it, and nothing can be told of what
     departs. Its filter has to expect more noise, though some of a gap may pass for that.
     """
     for least in WALKS:
         flights = [replace(f, inadequacy=f.inadequacy.with_walk(least)) for f in flights]
-        centre, known = settle(flights, candidates, baseline)
+        centre, known = settle(flights, candidates, baseline, rotation)
         if not departs(model_alone(flights, candidates, centre, known)):
             break
     return list(flights), centre, known
@@ -91,19 +95,27 @@ def departs(evidences: Sequence[Evidence]) -> bool:
     return any(not float(e.gram[0, 0]) < DEPARTED * e.samples for e in evidences)
 
 
-def likeliest(flight: Reconstruction, last: Gain, pushed: Sequence[Push] = ()) -> Gain:
+def likeliest(flight: Reconstruction, last: Gain, pushed: Sequence[Push] = (), rotation: bool | None = None) -> Gain:
     """The gain along a record with the gust intensity that is likeliest, sought from where it was found last.
 
     Args:
         pushed: generic discrepancies in the model.
+        rotation: whether the air turns; as it was found last if omitted.
     """
-    at = _nearest(last.sigma)
+    at, rotation = _nearest(last.sigma), last.gusts.rotation if rotation is None else rotation
     while True:
         tried = SIGMAS[max(at - NEAR, 0) : at + NEAR + 1]
-        found = choose_gain(flight, gains(flight, tried), pushed)
+        found = choose_gain(flight, tried, pushed, rotation)
         if found.sigma not in (tried[0], tried[-1]) or found.sigma in (SIGMAS[0], SIGMAS[-1]):
             return follow(flight, found)
         at = _nearest(found.sigma)
+
+
+def likeliest_explained(flight: Reconstruction, last: Gain, pushed: Sequence[Push] = ()) -> Gain:
+    """The same of a model with an explanation in it, which shows whether the air turns."""
+    found = likeliest(flight, last, pushed)
+    rotation = turns(flight, found, pushed)
+    return found if rotation == found.gusts.rotation else likeliest(flight, found, pushed, rotation)
 
 
 def _nearest(sigma: float) -> int:
@@ -137,7 +149,7 @@ def gains_with(flying: Flying, best: Hypothesis, nuisances: FloatArray, turns: i
     for turn in range(turns):
         moved = [_with(f, candidates, best, nuisances) for f in flying.flights]
         pushed = [_pushed(e, f, candidates, best.pushed) for e, f in zip(flying.evidences, moved, strict=True)]
-        known = each(likeliest, moved, [e.gain for e in flying.evidences], pushed)
+        known = each(likeliest_explained, moved, [e.gain for e in flying.evidences], pushed)
         if best.pushed or not best.effects or not differ(known, flying.evidences) or turn == turns - 1:
             break
         flying = replace(flying, evidences=each(_in_gusts, flying.evidences, known, moved))
@@ -159,7 +171,7 @@ def _with(flight: Reconstruction, candidates: Bank, best: Hypothesis, nuisances:
 
 def _in_gusts(evidence: Evidence, gain: Gain, flight: Reconstruction) -> Evidence:
     """Gain and whitening of one record where its gusts are others; what was flown is as it was."""
-    left = innovations(flight, flight.parameters, gain.K)[:, 0]
+    left = innovations(flight, flight.parameters, gain.K, (), gain.gusts.rotation)[:, 0]
     return replace(evidence, gain=gain, factor=whitening(left, gain, flight))
 
 
@@ -168,9 +180,10 @@ def _pushed(evidence: Evidence, flight: Reconstruction, candidates: Bank, weight
     terms = [term for term in candidates.terms if term.row in weights]
     if not terms:
         return []
-    left = innovations(flight, flight.parameters, evidence.gain.K)[:, 0]
+    gain = evidence.gain
+    left = innovations(flight, flight.parameters, gain.K, (), gain.gusts.rotation)[:, 0]
     return [replace(push, series=weights[push.row] * push.series)
-            for push in pushes(as_predicted(flight, left, evidence.gain), terms)]
+            for push in pushes(as_predicted(flight, left, gain), terms)]
 
 
 def unlike(one: Gain, other: Gain) -> float:

@@ -21,8 +21,9 @@ from sim2real.flown.settling import nearer
 from sim2real.library.candidates import Bank, parameter_rows
 from sim2real.planning.limits import hiding, per_deviation, with_nuisances
 from sim2real.planning.manoeuvre import MANOEUVRES, Manoeuvre, asked, flown
+from sim2real.prediction.gusts import Gusts
+from sim2real.prediction.kalman import DRYDEN, gains, linearise, roughness
 from sim2real.prediction.kalman import follow as follow_gain
-from sim2real.prediction.kalman import gains, gusts, linearise, roughness
 from sim2real.prediction.readings import apart
 from sim2real.records.channels import FED_BACK, G0, MEASURED, NOISE_FLOOR, SURFACES
 from sim2real.records.reconstruct import Reconstruction
@@ -183,8 +184,7 @@ def _apparent(made: Reconstruction, sigma: float) -> FloatArray:
     """Noise as a record would show it, gusts included: the gain takes off again what gusts add to it."""
     A, C, _ = (matrix[0] for matrix in linearise(made))
     C = C[:FED_BACK]
-    Qw, columns = gusts(made, sigma)
-    added = roughness(A, C, A[:, columns], C[:, columns], Qw, apart(made))
+    added = roughness(A, C, A[:, DRYDEN], C[:, DRYDEN], Gusts(sigma).noise(made), apart(made))
     out = made.noise.copy()
     out[:FED_BACK] = np.sqrt(out[:FED_BACK] ** 2 + added)
     return out

@@ -15,8 +15,11 @@ from icing_env.types import MEASUREMENT, STATE
 from sim2real.records.channels import FED_BACK
 
 STATES = ("u", "v", "w", "p", "q", "r", "altitude", "alpha_downwash", "dryden_u", "dryden_v1", "dryden_v2",
-          "dryden_w1", "dryden_w2", "gust_u", "gust_v", "gust_w", "gust_w_tail", "pitot", "vane_alpha", "vane_beta",
+          "dryden_w1", "dryden_w2", "dryden_p", "dryden_q", "dryden_r", "gust_u", "gust_v", "gust_w", "gust_w_tail",
+          "gust_p", "gust_q", "gust_r", "pitot", "vane_alpha", "vane_beta",
           *(f"filtered_{c}" for c in ("alpha", "beta", "p", "q", "r", "ax", "ay", "az")))  # fmt: skip
+
+ROTATION = ("dryden_p", "dryden_q", "dryden_r", "gust_p", "gust_q", "gust_r")  # zero where the air does not turn
 
 
 def columns(kind: np.dtype, names: tuple[str, ...]) -> np.ndarray:

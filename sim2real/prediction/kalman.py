@@ -15,7 +15,7 @@ import numpy as np
 
 from icing_env.jit import entry
 from icing_env.record import FloatArray
-from icing_env.turbulence import pair_noise, scales
+from sim2real.prediction.gusts import Gusts
 from sim2real.prediction.predictor import TANGENT, Predictor, stretch
 from sim2real.prediction.readings import ALTITUDE, apart, read_share, unread
 from sim2real.records.channels import FED_BACK, MEASURED, NOISE_FLOOR, SURFACES
@@ -41,18 +41,25 @@ class Gain:
     """Gain and innovation covariance for one gust intensity.
 
     Attributes:
-        sigma: m/s.
+        gusts: intensity and kind.
         K: of the steps, the last one's for good [steps, states, fed-back channels].
         S: covariance of the steady innovations, or of each step's [steps, ...].
         model: A, C, and the covariances of the states' noise, the readings' noise and between them.
+        start: covariance of the states at the start.
         duration: steps of the start that have gains of their own.
     """
 
-    sigma: float
+    gusts: Gusts
     K: FloatArray
     S: FloatArray
     model: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+    start: FloatArray
     duration: int
+
+    @property
+    def sigma(self) -> float:
+        """Gust intensity, m/s."""
+        return self.gusts.sigma
 
     @property
     def along(self) -> bool:
@@ -62,12 +69,12 @@ class Gain:
     def with_start(self) -> Gain:
         """The same with gains of their own for the first steps, from the uncertainty of the start."""
         always = np.zeros((self.duration, len(self.model[1])))
-        first, _, _ = _recursion(*self.model, _start_covariance(self.sigma), always)
+        first, _, _ = _recursion(*self.model, self.start, always)
         return replace(self, K=np.concatenate([first, self.K[-1:]]))
 
 
-def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),)) -> tuple[FloatArray, FloatArray,
-                                                                                        FloatArray]:
+def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),), rotation: bool = False
+              ) -> tuple[FloatArray, FloatArray, FloatArray]:  # fmt: skip
     """A, C of the one-step map about the record's typical state in each span, and B for a step of each of INPUTS.
 
     z' = A z, y' = C z with y' all readings at the end of the step; the first axis goes over the spans.
@@ -77,7 +84,7 @@ def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),)) -
     size[[i for i, n in enumerate(TANGENT) if n.startswith(("dryden", "gust"))]] = 1e-2
     n, m = len(TANGENT), len(spans)
     each = 2 * n + 2 * len(INPUTS) + 1
-    flown = Predictor(flight, flight.parameters, m * each)
+    flown = Predictor(flight, flight.parameters, m * each, rotation)
     flown.place_in(spans, each)
     change = np.zeros((each, n))
     change[:n], change[n : 2 * n] = np.diag(size), -np.diag(size)
@@ -96,19 +103,20 @@ def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),)) -
     return A, C, B
 
 
-def gains(flight: Reconstruction, sigmas: tuple[float, ...]) -> list[Gain]:
-    """Steady gain and innovation covariance for each gust intensity."""
-    A, C, B = (matrix[0] for matrix in linearise(flight))
+def gains(flight: Reconstruction, sigmas: Sequence[float], rotation: bool = False) -> list[Gain]:
+    """Steady gain and innovation covariance for each gust intensity; `rotation`: of air that turns."""
+    A, C, B = (matrix[0] for matrix in linearise(flight, rotation=rotation))
     C, out, every = C[:FED_BACK], list[Gain](), apart(flight)
     seen = flight.noise[:FED_BACK] ** 2
     # far apart, samples differ by gusts most of all: what is left of that says little, and too much harms less
     least = np.where(np.array(every) > 1, SURE * seen, 0.0)
     for sigma in sigmas:
-        Qw, columns = gusts(flight, sigma)
-        noise = np.maximum(seen - roughness(A, C, A[:, columns], C[:, columns], Qw, every), least)
-        model = _noisy(flight, A, C, B, sigma, Qw, noise, read_share(flight))
+        gusts = Gusts(sigma, rotation)
+        Qw = gusts.noise(flight)
+        noise = np.maximum(seen - roughness(A, C, A[:, DRYDEN], C[:, DRYDEN], Qw, every), least)
+        model = _noisy(flight, A, C, B, gusts, Qw, noise, read_share(flight))
         steady, S = _steady(*model)
-        out.append(Gain(sigma, steady[None], S, model, round(TRANSIENT / flight.dt)))
+        out.append(Gain(gusts, steady[None], S, model, _start_covariance(flight, gusts), round(TRANSIENT / flight.dt)))
     return out
 
 
@@ -121,16 +129,16 @@ def follow(flight: Reconstruction, gain: Gain) -> Gain:
     """
     steps, each = len(flight.time) - 1, max(round(SPAN / flight.dt), 1)
     spans = [slice(k, min(k + each, steps + 1)) for k in range(0, steps, each)]
-    P, (Qw, columns) = _start_covariance(gain.sigma), gusts(flight, gain.sigma)
+    P, Qw = gain.start, gain.gusts.noise(flight)
     lost = unread(flight)[1:].astype(float)
-    D = gain.model[1][:, columns]
+    D = gain.model[1][:, DRYDEN]
     share, steadily = read_share(flight), np.arange(FED_BACK) == ALTITUDE
     noise = np.diag(gain.model[3] - D @ Qw @ D.T) * np.maximum(share, 1e-3)
     share = np.where(steadily, share, share > 0.0)
     K, S = [], []
-    linear = flight.once("linear along", lambda: linearise(flight, spans))
+    linear = flight.once(f"linear along {gain.gusts.rotation}", lambda: linearise(flight, spans, gain.gusts.rotation))
     for span, A, C, B in zip(spans, *linear, strict=True):
-        model = _noisy(flight, A, C[:FED_BACK], B, gain.sigma, Qw, noise, share)
+        model = _noisy(flight, A, C[:FED_BACK], B, gain.gusts, Qw, noise, share)
         here, covariance, P = _recursion(*model, P, lost[span.start : span.start + each])
         K.append(np.swapaxes(here, 1, 2))
         S.append(covariance)
@@ -139,47 +147,46 @@ def follow(flight: Reconstruction, gain: Gain) -> Gain:
     return replace(gain, K=np.swapaxes(by_channel, 1, 2), S=np.concatenate(S))
 
 
-def gusts(flight: Reconstruction, sigma: float) -> tuple[FloatArray, list[int]]:
-    """Covariance of what drives the gusts over a step, and which states it drives."""
-    speed, height = float(np.median(flight.channel("airspeed"))), float(np.median(flight.altitude))
-    return gust_noise(sigma, speed, height, flight.dt), DRYDEN
-
-
-def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, sigma: float, Qw: FloatArray,
+def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, gusts: Gusts, Qw: FloatArray,
            noise: FloatArray, read: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """A, C, and the covariances of the states' noise, the readings' noise and between them.
 
     Args:
-        sigma: gust intensity.
+        gusts: intensity and kind.
         Qw: covariance of what drives the gusts.
         noise: variance of every fed-back channel's own noise.
         read: share of the steps at which each is read, where every step is to count as so much of a reading.
     """
     worse = flight.inadequacy.walk
-    walk = np.array([np.hypot(worse * WALK.get(n, 1e-6), WALK_OF_GUST.get(n, 0.0) * sigma) for n in TANGENT])
+    walk = np.array([np.hypot(worse * WALK.get(n, 1e-6), WALK_OF_GUST.get(n, 0.0) * gusts.sigma) for n in TANGENT])
     least = np.array([NOISE_FLOOR[name] for name in MEASURED[:FED_BACK]])
     G, D = A[:, DRYDEN], C[:, DRYDEN]
     driven = np.concatenate([flight.surface_noise, flight.power_noise])
-    Q = G @ Qw @ G.T + np.diag(walk**2 * flight.dt) + (B * driven**2) @ B.T + _within_steps(A, Qw)
+    Q = G @ Qw @ G.T + np.diag(walk**2 * flight.dt) + (B * driven**2) @ B.T + _within_steps(A, Qw, gusts.span(flight))
     R = np.diag(np.where(read == 0.0, ABSENT, np.maximum(noise, least**2) / np.maximum(read, 1e-3)))
     return A, C, Q, D @ Qw @ D.T + R, G @ Qw @ D.T
 
 
-def _within_steps(A: FloatArray, Qw: FloatArray) -> FloatArray:
+def _within_steps(A: FloatArray, Qw: FloatArray, span: float = 0.0) -> FloatArray:
     """Covariance of the states' noise from how gusts leave the straight lines between samples that the model has.
 
     White noise drives them: about its line such a gust is a Brownian bridge, whose mean over the step has a twelfth of
     the variance that the step adds. The tail's delay (a Pade form) passes what is quick with its sign turned, and twice
-    that mean a little later.
+    that mean a little later. Air that turns along a span (m) does so by what is quick in v and w.
     """
-    u, v, w, tail = (TANGENT.index(n) for n in ("gust_u", "gust_v", "gust_w", "gust_w_tail"))
+    u, v, w, tail, p, q, r = (TANGENT.index(f"gust_{n}") for n in ("u", "v", "w", "w_tail", "p", "q", "r"))
     moved = [*(TANGENT.index(n) for n in ("u", "v", "w", "p", "q", "r")), tail]
-    shape = np.zeros((3, 5))
-    shape[0, 0], shape[1, 1:3], shape[2, 3:5] = 1.0, *[[np.sqrt(1.5), (1.0 - np.sqrt(3.0)) / np.sqrt(2.0)]] * 2
+    shape = np.zeros((4, 8))
+    shape[0, 0] = shape[3, 5] = 1.0
+    shape[1, 1:3] = shape[2, 3:5] = np.sqrt(1.5), (1.0 - np.sqrt(3.0)) / np.sqrt(2.0)
     of_tail = 2.0 * A[moved, tail] / (1.0 + A[tail, tail])  # of a gust there that lasts the step
     of_wing = 2.0 * A[moved, w] - A[tail, w] * of_tail
-    mean = np.column_stack([2.0 * A[moved, u], 2.0 * A[moved, v], of_wing - of_tail])
-    mean[-1] = 0.0, 0.0, 2.0 * (1.0 - A[tail, tail])
+    by_w, by_v = of_wing - of_tail, 2.0 * A[moved, v]
+    if span > 0.0:  # the tail meets the gust at once
+        by_w = of_wing + of_tail - 2.0 * A[moved, q] * np.pi / (4.0 * span)
+        by_v = by_v + 2.0 * A[moved, r] * np.pi / (3.0 * span)
+    mean = np.column_stack([2.0 * A[moved, u], by_v, by_w, 2.0 * A[moved, p]])
+    mean[-1] = 0.0, 0.0, 0.0 if span > 0.0 else 2.0 * (1.0 - A[tail, tail]), 0.0
     out = np.zeros_like(A)
     out[np.ix_(moved, moved)] = mean * np.diag(shape @ Qw @ shape.T) @ mean.T / 12.0
     return out
@@ -256,9 +263,9 @@ def _recurse(A: Any, C: Any, Q: Any, R: Any, cross: Any, lost: Any, P: Any, K: A
         P[:] = 0.5*(after + after.T)
 
 
-def _start_covariance(sigma: float) -> FloatArray:
+def _start_covariance(flight: Reconstruction, gusts: Gusts) -> FloatArray:
     """How well a quarter of a second of measurements gives the start: gusts pass for motion through the air."""
-    gust = sigma + 0.3
+    sigma, gust = gusts.sigma, gusts.sigma + 0.3
     size = {"u": gust, "v": gust, "w": gust, "p": 0.02, "q": 0.02, "r": 0.02, "altitude": 1.0, "alpha_downwash": 0.02,
             "pitot": 0.3, "vane_alpha": 0.01, "vane_beta": 0.01, "phi": 0.003, "theta": 0.003}  # fmt: skip
     for name in TANGENT:
@@ -266,16 +273,5 @@ def _start_covariance(sigma: float) -> FloatArray:
             size[name] = sigma + 1e-3
         elif name.startswith("filtered"):
             size[name] = 1.0 if name[-2:] in ("ax", "ay", "az") else 0.02
+    size["dryden_p"] = size["gust_p"] = gusts.rolling(flight)
     return np.diag([size[name] ** 2 for name in TANGENT])
-
-
-def gust_noise(sigma: float, speed: float, height: float, dt: float) -> FloatArray:
-    """Covariance of what drives dryden_u, v1, v2, w1, w2 over a step [5, 5] (filters of icing_env.turbulence)."""
-    length_uv, length_w, ratio = scales(height)
-    out = np.zeros((5, 5))
-    for first, length, intensity in ((1, length_uv, ratio * sigma), (3, length_w, sigma)):
-        _, l11, l21, l22 = pair_noise(speed * dt / length)
-        factor = intensity * np.array([[l11, 0.0], [l21, l22]])
-        out[first : first + 2, first : first + 2] = factor @ factor.T
-    out[0, 0] = (ratio * sigma * pair_noise(speed * dt / length_uv)[1]) ** 2
-    return out

@@ -57,11 +57,15 @@ class Push:
 
 
 class Predictor:
-    """A fleet of variants flown along one record: a PARAMETERS row each, or one row for `n` of them."""
+    """A fleet of variants flown along one record: a PARAMETERS row each, or one row for `n` of them.
 
-    def __init__(self, flight: Reconstruction, parameters: NDArray, n: int | None = None) -> None:
+    `rotation`: whether gusts turn the air (`Gusts`).
+    """
+
+    def __init__(self, flight: Reconstruction, parameters: NDArray, n: int | None = None, rotation: bool = False
+                 ) -> None:  # fmt: skip
         self.flight, self.n = flight, len(parameters) if n is None else n
-        self.fleet = Fleet(held(parameters, flight.dt), self.n, flight.dt, substeps(flight.dt))
+        self.fleet = Fleet(held(parameters, flight.dt, rotation), self.n, flight.dt, substeps(flight.dt))
         self.x = self.fleet.state.view(np.float64).reshape(self.n, -1)
 
     def place(self, k: int) -> None:
@@ -164,8 +168,11 @@ def _listed(items: list[tuple[int, int, FloatArray]]) -> Listed:
     return at, np.array([item[2] for item in items], np.float64) if items else np.zeros((0, 0))
 
 
-def held(parameters: NDArray, dt: float) -> NDArray:
-    """PARAMETERS for a plant whose surfaces and powers follow a record: no noise, no limits, gusts as states."""
+def held(parameters: NDArray, dt: float, rotation: bool | NDArray[np.bool_] = False) -> NDArray:
+    """PARAMETERS for a plant whose surfaces and powers follow a record: no noise, no limits, gusts as states.
+
+    `rotation`: whether these turn the air, of all rows or each.
+    """
     out = copied(parameters)
     for name in NOISES:
         out[name] = 0.0
@@ -177,7 +184,7 @@ def held(parameters: NDArray, dt: float) -> NDArray:
             out[name] = 0.0
     out["hinge_elevator_hold"] = out["hinge_aileron_hold"] = 1e12
     out["spool_time"] = 1e12
-    out["turbulence_sigma_w"], out["turbulence_tail_delay"] = 0.1 * STILL, 1.0
+    out["turbulence_sigma_w"], out["turbulence_tail_delay"] = 0.1 * STILL, 1.0 - np.asarray(rotation, np.float64)
     return out
 
 
@@ -223,8 +230,8 @@ def put(fleet: Fleet, values: Mapping[str, float | FloatArray]) -> None:
     fleet.start()
 
 
-def innovations(flight: Reconstruction, parameters: NDArray, gain: FloatArray,
-                pushes: tuple[Push, ...] = ()) -> FloatArray:
+def innovations(flight: Reconstruction, parameters: NDArray, gain: FloatArray, pushes: tuple[Push, ...] = (),
+                rotation: bool = False) -> FloatArray:
     """Measured less predicted of every row [N-1, n, channels]; nan where nothing was measured.
 
     Args:
@@ -232,15 +239,17 @@ def innovations(flight: Reconstruction, parameters: NDArray, gain: FloatArray,
         parameters: a PARAMETERS row per variant.
         gain: K of a `Gain` [steps, states, fed-back channels], or one per row [n, ...]; the last step's goes on.
         pushes: generic discrepancies.
+        rotation: whether the gusts of the gain turn the air.
     """
-    return with_spare(flight, parameters, gain, pushes)[:, : len(parameters)]
+    return with_spare(flight, parameters, gain, pushes, rotation)[:, : len(parameters)]
 
 
-def with_spare(flight: Reconstruction, parameters: NDArray, gain: FloatArray,
-               pushes: tuple[Push, ...] = ()) -> FloatArray:
+def with_spare(flight: Reconstruction, parameters: NDArray, gain: FloatArray, pushes: tuple[Push, ...] = (),
+               rotation: bool = False) -> FloatArray:
     """The same, more rows behind those asked for where two or three beside full lanes would take longer than four."""
     count = len(parameters)
-    flown = Predictor(flight, np.take(parameters, [*range(count), *[count - 1] * (spare(count) * (gain.ndim == 3))]))
+    rows = np.take(parameters, [*range(count), *[count - 1] * (spare(count) * (gain.ndim == 3))])
+    flown = Predictor(flight, rows, rotation=rotation)
     flown.place(0)
     return lost(flown.fly(len(flight.time) - 1, gain=gain, pushes=pushes), np.isfinite(flight.measured[1:]))
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icing_env.record import FloatArray
+from sim2real.prediction.gusts import Gusts
 from sim2real.prediction.predictor import Predictor, put
 from sim2real.records.channels import MEASURED, TOLERANCE
 from sim2real.records.reconstruct import Reconstruction
@@ -52,14 +53,14 @@ def measured_windows(flight: Reconstruction, windows: Windows) -> FloatArray:
 
 
 def fly(flight: Reconstruction, parameters: NDArray, first: NDArray[np.intp], start: FloatArray, steps: int,
-        gusts: tuple[float, int] | None = None, push: Callable[[], Pusher] | None = None) -> FloatArray:
+        gusts: tuple[Gusts, int] | None = None, push: Callable[[], Pusher] | None = None) -> FloatArray:
     """Fly rows freely from sample `first` of each.
 
     Args:
         parameters: a PARAMETERS row each.
         start: [rows, FREE].
         steps: how many samples.
-        gusts: intensity (m/s) and seed, to make a synthetic measurement with noise; none if omitted.
+        gusts: what gusts, and a seed, to make a synthetic measurement with noise; none if omitted.
         push: makes what pushes the rows beside their own equations; nothing if omitted.
 
     Returns:
@@ -67,8 +68,7 @@ def fly(flight: Reconstruction, parameters: NDArray, first: NDArray[np.intp], st
     """
     flown = Predictor(flight, parameters)
     if gusts is not None:
-        row = flown.fleet.parameters
-        row["turbulence_sigma_w"] = gusts[0]
+        gusts[0].put(flown.fleet.parameters)
     values = {name: start[:, j] for j, name in enumerate(FREE)}
     values |= {name: series[first] for name, series in flight.controls.items()}
     put(flown.fleet, values | {"altitude": flight.altitude[first]})
@@ -137,7 +137,7 @@ def residuals(flight: Reconstruction, parameters: NDArray, windows: Windows,
     return np.where(np.isfinite(measured), away, np.nan), start
 
 
-def null_residuals(flight: Reconstruction, parameters: NDArray, windows: Windows, start: FloatArray, sigma: float,
+def null_residuals(flight: Reconstruction, parameters: NDArray, windows: Windows, start: FloatArray, gusts: Gusts,
                    repeats: int, seed: int) -> FloatArray:
     """The same for synthetic records of the model itself, with noise and gusts alone, blank where the record is.
 
@@ -148,7 +148,7 @@ def null_residuals(flight: Reconstruction, parameters: NDArray, windows: Windows
         [repeats, windows, samples, channels], in tolerances.
     """
     rows, first = np.repeat(parameters, repeats * len(windows.first)), np.tile(windows.first, repeats)
-    made = fly(flight, rows, first, np.tile(start, (repeats, 1)), windows.length, (max(sigma, 1e-6), seed))
+    made = fly(flight, rows, first, np.tile(start, (repeats, 1)), windows.length, (gusts, seed))
     blank = np.tile(~np.isfinite(measured_windows(flight, windows)), (repeats, 1, 1))
     made[blank] = np.nan
     found = estimate_start(flight, rows, first, made, windows.start)

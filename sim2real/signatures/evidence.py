@@ -18,7 +18,8 @@ from sim2real.actuators.paths import counted, path_gram, path_residuals
 from sim2real.library.candidates import Bank, parameter_rows
 from sim2real.library.terms import Term, pushes
 from sim2real.prediction.as_predicted import as_predicted
-from sim2real.prediction.kalman import Gain, follow, gains
+from sim2real.prediction.gusts import Gusts
+from sim2real.prediction.kalman import Gain, follow
 from sim2real.prediction.predictor import Push, held, innovations, with_spare
 from sim2real.records.channels import MEASURED
 from sim2real.records.reconstruct import Reconstruction
@@ -56,9 +57,15 @@ class Evidence:
     linear: Filter | None = None
 
     @property
-    def sigma_w(self) -> float:
-        """Gust intensity, m/s."""
-        return self.gain.sigma
+    def gusts(self) -> Gusts:
+        """Those along the record."""
+        return self.gain.gusts
+
+
+def typical(evidences: Sequence[Evidence]) -> Gusts:
+    """Gusts as they are along most of some records."""
+    along = [e.gusts for e in evidences]
+    return Gusts(float(np.mean([g.sigma for g in along])), 2 * sum(g.rotation for g in along) > len(along))
 
 
 def gather(flight: Reconstruction, bank: Bank, gain: Gain | None = None) -> Evidence:
@@ -68,8 +75,8 @@ def gather(flight: Reconstruction, bank: Bank, gain: Gain | None = None) -> Evid
         gain: of the predictor; the likeliest of SIGMAS if omitted.
     """
     if gain is None:
-        gain = follow(flight, choose_gain(flight, gains(flight, SIGMAS)))
-    base = innovations(flight, flight.parameters, gain.K)[:, 0]
+        gain = follow(flight, choose_gain(flight, SIGMAS))
+    base = innovations(flight, flight.parameters, gain.K, (), gain.gusts.rotation)[:, 0]
     factor = whitening(base, gain, flight)
     about = Filter(as_predicted(flight, base, gain), gain, factor, round(SETTLE / flight.dt))
     known = about.respond(pushes(about.flight, bank.terms))
@@ -95,7 +102,7 @@ def flown(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain:
           keep: Sequence[int] = (), linear: Responses = NONE) -> Evidence:
     """The same but for the paths, which do not care how the aircraft flies."""
     moved, renamed = to_fly(flight, rows, pushed)
-    left = with_spare(flight, np.take(rows, moved), gain.K, renamed)
+    left = with_spare(flight, np.take(rows, moved), gain.K, renamed, gain.gusts.rotation)
     return told(flight, left, moved, len(rows), gain, factor, keep, linear)
 
 

@@ -18,10 +18,12 @@ from sim2real.signatures.whitening import SETTLE, factors, whiten
 # m/s
 SIGMAS = (0.003, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.55, 0.67, 0.82, 1.0, 1.2, 1.45, 1.75, 2.1, 2.6,
           3.2)  # fmt: skip
+TURNS, STILL_TURNS = 1.0, 0.3  # of log likelihood a sample that speak for air that turns, and for leaving it at that
 TOGETHER = 100  # samples that the channels have to share for their covariance to be judged
 
 
-def choose_gain(flight: Reconstruction, options: list[Gain], pushed: Sequence[Push] = ()) -> Gain:
+def choose_gain(flight: Reconstruction, sigmas: Sequence[float], pushed: Sequence[Push] = (), rotation: bool = False
+                ) -> Gain:  # fmt: skip
     """The gust intensity that makes the model's innovations likeliest, between those given by a parabola.
 
     Their size is taken from medians: a gap that shows as an offset or in the moments of a manoeuvre is no gust. It has
@@ -29,14 +31,28 @@ def choose_gain(flight: Reconstruction, options: list[Gain], pushed: Sequence[Pu
     sideslip five standard deviations off.
 
     Args:
-        options: in the order of their intensities.
+        sigmas: intensities, ascending.
         pushed: generic discrepancies that the model is flown with, whatever their rows.
+        rotation: whether the air turns.
     """
+    options = gains(flight, sigmas, rotation)
     scores = likelihoods(flight, options, pushed)
     k = int(np.argmax(scores))
     if k in (0, len(options) - 1):
         return options[k]
-    return gains(flight, (_peak([g.sigma for g in options[k - 1 : k + 2]], scores[k - 1 : k + 2]),))[0]
+    return gains(flight, (_peak(sigmas[k - 1 : k + 2], scores[k - 1 : k + 2]),), rotation)[0]
+
+
+def turns(flight: Reconstruction, found: Gain, pushed: Sequence[Push] = ()) -> bool:
+    """Whether the air turns by how the innovations are with the gusts found, and of the same intensity otherwise.
+
+    What a gap makes of roll and yaw passes for air that turns, so that this is for a model with an explanation in it:
+    of turning air of 0.5 m/s the log likelihood of a sample is higher by 3 to 7 (of 0.2 m/s by 0.6), of air that does
+    not turn lower by 0.1 to 6.
+    """
+    other = gains(flight, (found.sigma,), not found.gusts.rotation)
+    here, there = (likelihoods(flight, gain, pushed)[0] for gain in ([found], other))
+    return here - there > STILL_TURNS if found.gusts.rotation else there - here > TURNS
 
 
 def likelihoods(flight: Reconstruction, options: Sequence[Gain], pushed: Sequence[Push] = ()) -> list[float]:
@@ -44,10 +60,13 @@ def likelihoods(flight: Reconstruction, options: Sequence[Gain], pushed: Sequenc
 
     That of a filter which loses the record is minus infinity: what is lost is constant, and medians would call it calm.
     Where a channel is slow, gains at every step are too far from those that it needs: gusts are judged by these.
+    All of them are of gusts of one kind.
     """
+    rotation = options[0].gusts.rotation
     options = [follow(flight, gain) for gain in options] if slow(flight) else options
     everywhere = tuple(replace(push, row=i) for push in pushed for i in range(len(options)))
-    left = innovations(flight, np.repeat(flight.parameters, len(options)), np.stack([g.K for g in options]), everywhere)
+    left = innovations(flight, np.repeat(flight.parameters, len(options)), np.stack([g.K for g in options]), everywhere,
+                       rotation)
     left = left[round(SETTLE / flight.dt) :]
     seen = np.isfinite(left[:, 0, : FED_BACK - 1])
     use = np.flatnonzero(seen.sum(axis=0) > 0.5 * seen.sum(axis=0).max())

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from icing_env.jit import entry
 from icing_env.record import FloatArray
-from sim2real.prediction.correction import STATES
+from sim2real.prediction.correction import ROTATION, STATES
 from sim2real.prediction.kalman import Gain, linearise
-from sim2real.prediction.predictor import Push, seen
+from sim2real.prediction.predictor import TANGENT, Push, seen
 from sim2real.records.channels import MEASURED
 from sim2real.records.reconstruct import Reconstruction
 
@@ -62,19 +62,27 @@ class Filter:
         order, onset = _in_turn(pushes, rows)
         place = np.argsort(order)
         forces, errors = ([(int(place[row]), at, series) for row, at, series in items] for items in (forces, errors))
-        _respond(*self._along, self.gain.K, seen(flight), *_by_sample(forces, flight), *_by_sample(errors, flight),
+        A, C, K, each, place_of = self._along
+        forces = [(row, place_of[at], series) for row, at, series in forces]
+        _respond(A, C, each, K, seen(flight), *_by_sample(forces, flight), *_by_sample(errors, flight),
                  self.factor, order, onset, out, self.first)
         return Responses(tuple(rows), out)
 
     @cached_property
-    def _along(self) -> tuple[FloatArray, FloatArray, int]:
-        """A, C in the middle of each span, and the steps of one."""
+    def _along(self) -> tuple[FloatArray, FloatArray, FloatArray, int, NDArray[np.intp]]:
+        """A, C in the middle of each span, the gain, and the steps of a span; where each state stands in them.
+
+        States of air that turns are left out where it does not.
+        """
         dt, steps = self.flight.dt, len(self.flight.time) - 1
         each = max(round(SPAN / dt), 1)
         spans = [slice(k, min(k + each, steps + 1)) for k in range(0, steps, each)]
-        found = [linearise(self.flight, spans[k : k + AT_ONCE])[:2] for k in range(0, len(spans), AT_ONCE)]
+        rotation = self.gain.gusts.rotation
+        found = [linearise(self.flight, spans[k : k + AT_ONCE], rotation)[:2] for k in range(0, len(spans), AT_ONCE)]
         A, C = (np.concatenate(matrices) for matrices in zip(*found, strict=True))
-        return A, C, each
+        moves = np.array([rotation or name not in ROTATION for name in TANGENT])
+        K = np.ascontiguousarray(self.gain.K[:, moves])
+        return A[:, moves][:, :, moves], C[:, :, moves], K, each, np.cumsum(moves) - 1
 
 
 def _in_a_step(flight: Reconstruction, target: str, size: FloatArray) -> list[tuple[int, FloatArray]]:

@@ -57,7 +57,7 @@ def _of_what(found: Diagnosis) -> str:
     """Records, their length and the gusts they were flown in."""
     flights, held_out = found.details.flights, found.details.held_out
     seconds = sum(len(f.time) * f.dt for f in flights)
-    gusts = sorted({round(e.sigma_w, 2) for e in found.details.evidences})
+    gusts = sorted({round(e.gusts.sigma, 2) for e in found.details.evidences})
     told = f"{gusts[0]:g} m/s" if len(gusts) == 1 else f"{gusts[0]:g} to {gusts[-1]:g} m/s"
     more = f", {len(held_out)} held out" if held_out else ""
     return f"{len(flights)} record{'s' * (len(flights) != 1)} of {seconds:.0f} s in all, gusts of {told}{more}"

@@ -1,0 +1,71 @@
+"""Gusts along a record as the filter expects them: the Dryden filters of `icing_env.turbulence`, of one intensity."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icing_env.record import FloatArray
+from icing_env.turbulence import pair_noise, roll_spectrum, scales
+from sim2real.records.reconstruct import Reconstruction
+
+
+class Gusts(NamedTuple):
+    """Turbulence along a record.
+
+    Attributes:
+        sigma: intensity, m/s.
+        rotation: whether the air turns (the rotational spectra of MIL-F-8785C), and the tail meets no gust later.
+    """
+
+    sigma: float
+    rotation: bool = False
+
+    def put(self, parameters: NDArray) -> None:
+        """Let PARAMETERS rows meet them."""
+        parameters["turbulence_sigma_w"] = max(self.sigma, 1e-6)
+        parameters["turbulence_tail_delay"] = float(not self.rotation)
+
+    def noise(self, flight: Reconstruction) -> FloatArray:
+        """Covariance of what drives them over a step of a record [dryden states, dryden states]."""
+        speed, height = _typical(flight)
+        return gust_noise(self.sigma, speed, height, flight.dt, self.span(flight))
+
+    def span(self, flight: Reconstruction) -> float:
+        """That along which the air turns, m; 0 if it does not."""
+        return float(flight.parameters["span"][0]) if self.rotation else 0.0
+
+    def rolling(self, flight: Reconstruction) -> float:
+        """Standard deviation of the rolling gust, rad/s."""
+        speed, height = _typical(flight)
+        return _rolling(self.sigma, speed, height, self.span(flight))[0] if self.rotation else 0.0
+
+
+def _typical(flight: Reconstruction) -> tuple[float, float]:
+    return float(np.median(flight.channel("airspeed"))), float(np.median(flight.altitude))
+
+
+def _rolling(sigma: float, speed: float, height: float, span: float) -> tuple[float, float]:
+    sd, time = roll_spectrum(sigma, scales(height)[1], span, speed)
+    return float(sd), float(time)
+
+
+def gust_noise(sigma: float, speed: float, height: float, dt: float, span: float = 0.0) -> FloatArray:
+    """Covariance of what drives dryden_u, v1, v2, w1, w2, p, q, r over a step [8, 8]; the last two only follow.
+
+    Args:
+        span: m; 0 if the air does not turn.
+    """
+    length_uv, length_w, ratio = scales(height)
+    out = np.zeros((8, 8))
+    for first, length, intensity in ((1, length_uv, ratio * sigma), (3, length_w, sigma)):
+        _, l11, l21, l22 = pair_noise(speed * dt / length)
+        factor = intensity * np.array([[l11, 0.0], [l21, l22]])
+        out[first : first + 2, first : first + 2] = factor @ factor.T
+    out[0, 0] = (ratio * sigma * pair_noise(speed * dt / length_uv)[1]) ** 2
+    if span > 0.0:
+        sd, time = _rolling(sigma, speed, height, span)
+        out[5, 5] = sd**2 * (1.0 - np.exp(-2.0 * dt / time))
+    return out
