@@ -19,8 +19,9 @@ from sim2real.diagnosis import Diagnosis, diagnose
 from sim2real.flown.settling import likeliest_explained
 from sim2real.library.candidates import bank, nodes, nuisances, unbroken
 from sim2real.library.sizes import piece_prior, size_prior
+from sim2real.prediction.correction import ROTATION
 from sim2real.prediction.kalman import gains, linearise
-from sim2real.prediction.predictor import innovations
+from sim2real.prediction.predictor import TANGENT, innovations
 from sim2real.records.channels import FED_BACK
 from sim2real.records.reconstruct import SHORTEST, reconstruct, unfiltered
 from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
@@ -211,6 +212,13 @@ def test_air_that_turns_is_told_from_air_that_reaches_the_tail_later(sigma, rota
     gain = likeliest_explained(flight, choose_gain(flight, SIGMAS))
     assert gain.gusts.rotation == rotation
     assert gain.sigma == pytest.approx(sigma, rel=0.25)
+
+
+def test_air_that_does_not_turn_is_not_taken_to_turn_at_the_start_either():
+    flight = reconstruct(flown("", 0.0, 5))
+    still, turning = (gains(flight, (0.5,), rotation)[0].with_start().K for rotation in (False, True))
+    at = [TANGENT.index(name) for name in ROTATION]
+    assert not still[:, at].any() and turning[:, at].any(axis=(0, 2)).all()
 
 
 def test_the_predictor_forgets_its_start():

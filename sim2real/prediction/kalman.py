@@ -15,6 +15,7 @@ import numpy as np
 
 from icing_env.jit import entry
 from icing_env.record import FloatArray
+from sim2real.prediction.correction import ROTATION
 from sim2real.prediction.gusts import Gusts
 from sim2real.prediction.predictor import TANGENT, Predictor, stretch
 from sim2real.prediction.readings import ALTITUDE, apart, read_share, unread
@@ -273,5 +274,6 @@ def _start_covariance(flight: Reconstruction, gusts: Gusts) -> FloatArray:
             size[name] = sigma + 1e-3
         elif name.startswith("filtered"):
             size[name] = 1.0 if name[-2:] in ("ax", "ay", "az") else 0.02
-    size["dryden_p"] = size["gust_p"] = gusts.rolling(flight)
+    turning = gusts.rolling(flight)
+    size |= {n: (sigma if turning else 0.0) if n in ("dryden_q", "dryden_r") else turning for n in ROTATION}
     return np.diag([size[name] ** 2 for name in TANGENT])
