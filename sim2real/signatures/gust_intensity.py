@@ -18,7 +18,8 @@ from sim2real.signatures.whitening import SETTLE, factors, whiten
 # m/s
 SIGMAS = (0.003, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.55, 0.67, 0.82, 1.0, 1.2, 1.45, 1.75, 2.1, 2.6,
           3.2)  # fmt: skip
-TURNS, STILL_TURNS = 1.0, 0.3  # of log likelihood a sample that speak for air that turns, and for leaving it at that
+PLAIN, STILL = 1.0, 0.3  # of log likelihood a sample, the least that speaks for air that turns, and to leave it at that
+TURNING, MOST = 8.0, 1.5  # of the same per (m/s)^2, half of what it is; m/s
 TOGETHER = 100  # samples that the channels have to share for their covariance to be judged
 
 
@@ -44,15 +45,23 @@ def choose_gain(flight: Reconstruction, sigmas: Sequence[float], pushed: Sequenc
 
 
 def turns(flight: Reconstruction, found: Gain, pushed: Sequence[Push] = ()) -> bool:
-    """Whether the air turns by how the innovations are with the gusts found, and of the same intensity otherwise.
+    """Whether the air turns, by how likely the innovations are with the gusts found and with those of the other kind.
 
-    What a gap makes of roll and yaw passes for air that turns, so that this is for a model with an explanation in it:
-    of turning air of 0.5 m/s the log likelihood of a sample is higher by 3 to 7 (of 0.2 m/s by 0.6), of air that does
-    not turn lower by 0.1 to 6.
+    What a gap makes of roll and yaw passes for air that turns, so that this is for a model with an explanation in it,
+    and the log likelihood of a sample has to gain half of what air that turns so much makes of it (15 to 25 per
+    (m/s)^2); no more than of MOST, since what is not understood passes for stronger gusts than there are.
+    Of an aircraft that the model is known to follow poorly nothing is said: what it lacks passes for it, too.
     """
-    other = gains(flight, (found.sigma,), not found.gusts.rotation)
-    here, there = (likelihoods(flight, gain, pushed)[0] for gain in ([found], other))
-    return here - there > STILL_TURNS if found.gusts.rotation else there - here > TURNS
+    if flight.inadequacy.walk > 1.0:
+        return False
+    here = likelihoods(flight, [found], pushed)[0]
+    there = likelihoods(flight, gains(flight, (found.sigma,), not found.gusts.rotation), pushed)[0]
+    if found.gusts.rotation:
+        return here - there > max(STILL, 0.5 * TURNING * min(found.sigma, MOST) ** 2)
+    if there - here <= PLAIN:
+        return False
+    turning = choose_gain(flight, SIGMAS, pushed, True)
+    return likelihoods(flight, [turning], pushed)[0] - here > TURNING * min(turning.sigma, MOST) ** 2
 
 
 def likelihoods(flight: Reconstruction, options: Sequence[Gain], pushed: Sequence[Push] = ()) -> list[float]:
