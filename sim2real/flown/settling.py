@@ -23,7 +23,7 @@ from sim2real.prediction.readings import slow
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.records.side_by_side import each
 from sim2real.signatures.evidence import Evidence, gather
-from sim2real.signatures.gust_intensity import SIGMAS, choose_gain, turns
+from sim2real.signatures.gust_intensity import SIGMAS, air_turns, choose_gain
 from sim2real.signatures.tempering import temper, total
 from sim2real.signatures.whitening import whitening
 
@@ -114,7 +114,7 @@ def likeliest(flight: Reconstruction, last: Gain, pushed: Sequence[Push] = (), r
 def likeliest_explained(flight: Reconstruction, last: Gain, pushed: Sequence[Push] = ()) -> Gain:
     """The same of a model with an explanation in it, which shows whether the air turns."""
     found = likeliest(flight, last, pushed)
-    rotation = turns(flight, found, pushed)
+    rotation = air_turns(flight, found, pushed)
     return found if rotation == found.gusts.rotation else likeliest(flight, found, pushed, rotation)
 
 

@@ -44,7 +44,7 @@ def choose_gain(flight: Reconstruction, sigmas: Sequence[float], pushed: Sequenc
     return gains(flight, (_peak(sigmas[k - 1 : k + 2], scores[k - 1 : k + 2]),), rotation)[0]
 
 
-def turns(flight: Reconstruction, found: Gain, pushed: Sequence[Push] = ()) -> bool:
+def air_turns(flight: Reconstruction, found: Gain, pushed: Sequence[Push] = ()) -> bool:
     """Whether the air turns, by how likely the innovations are with the gusts found and with those of the other kind.
 
     What a gap makes of roll and yaw passes for air that turns, so that this is for a model with an explanation in it,
