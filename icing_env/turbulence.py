@@ -212,39 +212,6 @@ def follow_path(s: Any, p: Any, airspeed: float, dt: float, v_before: float, w_b
 
 
 @kernel
-def drift_translation(s: Any, airspeed: float, dt: float) -> None:
-    """What the filters of u, v, w become without new noise: their expected values."""
-    length_uv, length_w, _ratio = scales(s.altitude)
-    tau = airspeed * dt / length_uv
-    decay = math.exp(-tau)
-    s.dryden_u = decay * s.dryden_u
-    s.dryden_v2 = decay * (s.dryden_v2 + tau * s.dryden_v1)
-    s.dryden_v1 = decay * s.dryden_v1
-    if length_w != length_uv:
-        tau = airspeed * dt / length_w
-        decay = math.exp(-tau)
-    s.dryden_w2 = decay * (s.dryden_w2 + tau * s.dryden_w1)
-    s.dryden_w1 = decay * s.dryden_w1
-
-
-@kernel
-def drift_turbulence(s: Any, p: Any, airspeed: float, dt: float) -> None:
-    """`advance_turbulence` as a predictor sees it: nothing is drawn."""
-    v, before = max(airspeed, LOWEST_AIRSPEED), s.gust_w
-    v_before, w_before = transverse(s.dryden_v1, s.dryden_v2), transverse(s.dryden_w1, s.dryden_w2)
-    drift_translation(s, v, dt)
-    put_translation(s)
-    if p.turbulence_tail_delay != 0.0:
-        stay_level(s)
-        reach_tail(s, p, v, before, dt)
-        return
-    s.dryden_p *= math.exp(-dt / roll_time(p.span, v))
-    s.gust_p = s.dryden_p
-    follow_path(s, p, v, dt, v_before, w_before)
-    s.gust_w_tail = s.gust_w
-
-
-@kernel
 def reach_tail(s: Any, p: Any, airspeed: float, before: float, dt: float) -> None:
     """The vertical gust at the tail behind its delay; `before`: gust_w at the start of the step."""
     half = 0.5 * (s.gust_w_tail + before)  # the state of the Pade filter, from its last output and input

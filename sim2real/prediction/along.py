@@ -34,9 +34,10 @@ from icing_env.memory import matrix, rows
 from icing_env.parameters import PARAMETERS
 from icing_env.sensors import filter_flow_and_inertial, read_gyros_quietly, read_quietly
 from icing_env.simulate import CLOCK, NUMBER
-from icing_env.turbulence import advance_turbulence, drift_turbulence
+from icing_env.turbulence import advance_turbulence
 from icing_env.types import COMMAND, CONTINUOUS, CURRENT, MEASUREMENT, OUTCOME, STATE
 from sim2real.prediction.correction import CHANGED, E0, E1, E2, E3, X, columns, follow_record
+from sim2real.prediction.gusts import drift_turbulence
 from sim2real.records.channels import FED_BACK, MEASURED, SURFACES
 
 STILL = 1e-9  # m/s: gusts below it keep their states but draw nothing

@@ -1,14 +1,30 @@
-"""Gusts along a record as the filter expects them: the Dryden filters of `icing_env.turbulence`, of one intensity."""
+"""Gusts along a record as the filter expects them: the Dryden filters of `icing_env.turbulence`, of one intensity.
+
+`drift_turbulence` takes the place of `advance_turbulence` where the plant is a predictor.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from icing_env.jit import kernel
 from icing_env.record import FloatArray
-from icing_env.turbulence import pair_noise, roll_spectrum, scales
+from icing_env.turbulence import (
+    LOWEST_AIRSPEED,
+    follow_path,
+    pair_noise,
+    put_translation,
+    reach_tail,
+    roll_spectrum,
+    roll_time,
+    scales,
+    stay_level,
+    transverse,
+)
 from sim2real.records.reconstruct import Reconstruction
 
 
@@ -69,3 +85,36 @@ def gust_noise(sigma: float, speed: float, height: float, dt: float, span: float
         sd, time = _rolling(sigma, speed, height, span)
         out[5, 5] = sd**2 * (1.0 - np.exp(-2.0 * dt / time))
     return out
+
+
+@kernel
+def drift_translation(s: Any, airspeed: float, dt: float) -> None:
+    """What the filters of u, v, w become without new noise: their expected values."""
+    length_uv, length_w, _ratio = scales(s.altitude)
+    tau = airspeed * dt / length_uv
+    decay = math.exp(-tau)
+    s.dryden_u = decay * s.dryden_u
+    s.dryden_v2 = decay * (s.dryden_v2 + tau * s.dryden_v1)
+    s.dryden_v1 = decay * s.dryden_v1
+    if length_w != length_uv:
+        tau = airspeed * dt / length_w
+        decay = math.exp(-tau)
+    s.dryden_w2 = decay * (s.dryden_w2 + tau * s.dryden_w1)
+    s.dryden_w1 = decay * s.dryden_w1
+
+
+@kernel
+def drift_turbulence(s: Any, p: Any, airspeed: float, dt: float) -> None:
+    """`advance_turbulence` as a predictor sees it: nothing is drawn."""
+    v, before = max(airspeed, LOWEST_AIRSPEED), s.gust_w
+    v_before, w_before = transverse(s.dryden_v1, s.dryden_v2), transverse(s.dryden_w1, s.dryden_w2)
+    drift_translation(s, v, dt)
+    put_translation(s)
+    if p.turbulence_tail_delay != 0.0:
+        stay_level(s)
+        reach_tail(s, p, v, before, dt)
+        return
+    s.dryden_p *= math.exp(-dt / roll_time(p.span, v))
+    s.gust_p = s.dryden_p
+    follow_path(s, p, v, dt, v_before, w_before)
+    s.gust_w_tail = s.gust_w
