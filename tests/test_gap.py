@@ -11,6 +11,7 @@ import pytest
 from icing_env import scenario
 from sim2real.closing import gap
 from sim2real.closing.remedy import Remedy
+from sim2real.prediction.gusts import Gusts
 from sim2real.prediction.windows import FARTHEST
 from sim2real.records.reconstruct import Reconstruction, reconstruct
 from testbed.flight import fly
@@ -25,7 +26,7 @@ def flight() -> Reconstruction:
 def with_number(name: str, value: float) -> gap.Energy:
     row = flight().parameters.copy()
     row[name] = value
-    return gap.energies(replace(flight(), parameters=row), Remedy(), 0.3, 0)
+    return gap.energies(replace(flight(), parameters=row), Remedy(), Gusts(0.3), 0)
 
 
 @pytest.mark.parametrize(("damping", "all_of_them"), [(0.13, False), (0.3, True)])

@@ -13,6 +13,7 @@ from sim2real.baseline.references import Baseline, fit_baseline
 from sim2real.closing import gap
 from sim2real.closing.remedy import Remedy
 from sim2real.library.candidates import bank
+from sim2real.prediction.gusts import Gusts
 from sim2real.records.powers import spin_inertia, thrust_per_power
 from sim2real.records.reconstruct import Reconstruction, reconstruct
 from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
@@ -203,7 +204,7 @@ def test_reference_flights_find_the_derivatives_of_another_aircraft(clean: list[
 def test_what_references_leave_of_another_aircraft_is_small(clean: list[Reconstruction], corrected: Baseline) -> None:
     """In flights like them; the published model is off by tolerances. Without terms across axes it is twice that."""
     for flight in clean:
-        before, after = (gap.energies(reconstruct(flight.record, row), Remedy(), 0.003, 0) for row in (
+        before, after = (gap.energies(reconstruct(flight.record, row), Remedy(), Gusts(0.003), 0) for row in (
             None, corrected.near(flight.record)))  # fmt: skip
         assert gap.g(before.before, before.alone) > 1.5
         assert gap.g(after.before, after.alone) < 0.06

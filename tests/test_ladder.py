@@ -15,6 +15,7 @@ from sim2real.closing import black_box, gap
 from sim2real.closing.remedy import Remedy
 from sim2real.diagnosis import Diagnosis, diagnose
 from sim2real.ladder import synthetic
+from sim2real.prediction.gusts import Gusts
 from sim2real.records.reconstruct import reconstruct
 from testbed.flight import fly
 
@@ -66,7 +67,7 @@ def test_a_model_that_flies_to_no_numbers_agrees_with_nothing():
 def test_synthetic_pieces_keep_what_is_known_of_their_own_time():
     flight = reconstruct(flown("", "", 0.0, 3))
     known = np.arange(len(flight.time))[:, None] * np.ones(6)
-    pieces = synthetic(replace(flight, known=known), 0.5, 1)
+    pieces = synthetic(replace(flight, known=known), Gusts(0.5), 1)
     assert len(pieces) > 1
     for piece in pieces:
         assert piece.known is not None and piece.known.shape == (len(piece.time), 6)
@@ -99,8 +100,8 @@ def test_a_regression_learns_what_a_changed_plant_adds():
 def test_a_gap_in_a_path_shows_and_closes_once_the_path_is_flown(name, parameter, size):
     flight, change = reconstruct(flown(name, parameter, size, 13)), Remedy({name: {parameter: size}})
     assert change.paths == ("elevator",)
-    hidden = gap.held_out(gap.energies(flight, change, 0.5, 1), 0)
-    shown = gap.held_out(gap.energies(flight, change, 0.5, 1, change.paths), 0)
+    hidden = gap.held_out(gap.energies(flight, change, Gusts(0.5), 1), 0)
+    shown = gap.held_out(gap.energies(flight, change, Gusts(0.5), 1, change.paths), 0)
     assert hidden["before"] == pytest.approx(hidden["after"], abs=1e-9)  # positions are as recorded either way
     assert shown["before"] > 3.0 * hidden["before"]
     assert shown["closure"] > 0.85

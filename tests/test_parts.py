@@ -18,6 +18,7 @@ from sim2real.closing.remedy import remedy
 from sim2real.library.candidates import bank, nuisances
 from sim2real.posterior.hypotheses import Hypothesis, Settled
 from sim2real.posterior.sets import SetFit
+from sim2real.prediction.gusts import Gusts
 from sim2real.records.reconstruct import Reconstruction, reconstruct
 from testbed.flight import fly
 
@@ -45,7 +46,7 @@ def ways(term: dict[str, float] | None, slope: float) -> tuple[Flown, Flown]:
                            settled=Settled(settled, np.eye(len(MOVES))))  # fmt: skip
     described = None if term is None else Description("pitching_moment", (), term, np.eye(len(term)))
     flights, alone = [flight()], remedy(explained, described)
-    before = flown_freely(flights, [0.003], alone, 0)
+    before = flown_freely(flights, [Gusts(0.003)], alone, 0)
     change = with_own_numbers(alone, explained, described, MOVES)
     whole = Flown(alone, before, change, replace(before, after=gap.of_all(flights, change, change.paths)))
     return whole, flown_parts(flights, before, explained, described, MOVES)

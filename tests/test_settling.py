@@ -19,6 +19,7 @@ from sim2real.flown.settling import likeliest, settle
 from sim2real.library.candidates import bank
 from sim2real.prediction.kalman import gains
 from sim2real.records.reconstruct import Reconstruction
+from sim2real.signatures import gust_intensity
 from sim2real.signatures.gust_intensity import SIGMAS, choose_gain, likelihoods
 from testbed.withheld.draw import SPREAD, published_spread
 from testbed.withheld.files import record_text, side_text
@@ -66,12 +67,14 @@ def test_the_likeliest_gusts_are_found_from_wherever_they_were_sought_last(tmp_p
     assert likeliest(flight, first).sigma == likeliest(flight, gains(flight, (1.45,))[0]).sigma
 
 
-def test_a_filter_that_loses_the_record_is_not_the_likeliest(tmp_path):
+def test_a_filter_that_loses_the_record_is_not_the_likeliest(tmp_path, monkeypatch):
     """Whatever is lost is a constant, whose median deviation is none at all."""
     flight = flown(tmp_path, 1)[0][0]
-    good, wild = gains(flight, (1.2, 3.2))
+    weak, good, wild = gains(flight, (0.8, 1.2, 3.2))
     wild = replace(wild, K=40.0 * wild.K)
     scores = likelihoods(flight, [good, wild])
     assert np.isfinite(scores[0]) and scores[1] == -np.inf
-    assert choose_gain(flight, [good, wild]).sigma == good.sigma
-    assert choose_gain(flight, [gains(flight, (0.8,))[0], good, wild]).sigma == good.sigma
+    options = {gain.sigma: gain for gain in (weak, good, wild)}
+    monkeypatch.setattr(gust_intensity, "gains", lambda _, sigmas, _rotation: [options[s] for s in sigmas])
+    assert choose_gain(flight, (1.2, 3.2)).sigma == good.sigma
+    assert choose_gain(flight, (0.8, 1.2, 3.2)).sigma == good.sigma
