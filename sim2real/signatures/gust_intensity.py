@@ -50,9 +50,10 @@ def air_turns(flight: Reconstruction, found: Gain, pushed: Sequence[Push] = ()) 
     What a gap makes of roll and yaw passes for air that turns, so that this is for a model with an explanation in it,
     and the log likelihood of a sample has to gain half of what air that turns so much makes of it (15 to 25 per
     (m/s)^2); no more than of MOST, since what is not understood passes for stronger gusts than there are.
-    Of an aircraft that the model is known to follow poorly nothing is said: what it lacks passes for it, too.
+    Of an aircraft that the model is known to follow poorly, or of which only the strongest gusts make sense, nothing is
+    said: what the model lacks passes for air that turns, too.
     """
-    if flight.inadequacy.walk > 1.0:
+    if flight.inadequacy.walk > 1.0 or (found.gusts.rotation and found.sigma == SIGMAS[-1]):
         return False
     here = likelihoods(flight, [found], pushed)[0]
     there = likelihoods(flight, gains(flight, (found.sigma,), not found.gusts.rotation), pushed)[0]
@@ -61,6 +62,8 @@ def air_turns(flight: Reconstruction, found: Gain, pushed: Sequence[Push] = ()) 
     if there - here <= PLAIN:
         return False
     turning = choose_gain(flight, SIGMAS, pushed, True)
+    if turning.sigma == SIGMAS[-1]:
+        return False
     return likelihoods(flight, [turning], pushed)[0] - here > TURNING * min(turning.sigma, MOST) ** 2
 
 
