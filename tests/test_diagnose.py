@@ -216,9 +216,10 @@ def test_air_that_turns_is_told_from_air_that_reaches_the_tail_later(sigma, rota
 
 def test_air_that_does_not_turn_is_not_taken_to_turn_at_the_start_either():
     flight = reconstruct(flown("", 0.0, 5))
-    still, turning = (gains(flight, (0.5,), rotation)[0].with_start().K for rotation in (False, True))
+    still, turning = (gains(flight, (0.5,), rotation)[0].with_start() for rotation in (False, True))
     at = [TANGENT.index(name) for name in ROTATION]
-    assert not still[:, at].any() and turning[:, at].any(axis=(0, 2)).all()
+    assert not still.start[at].any() and not still.K[:, at].any()
+    assert np.diag(turning.start)[at].all() and turning.K[:, at].any(axis=(0, 2)).all()
 
 
 def test_the_predictor_forgets_its_start():
