@@ -60,7 +60,7 @@ def _of_what(found: Diagnosis) -> str:
     gusts = sorted({round(e.gusts.sigma, 2) for e in found.details.evidences})
     told = f"{gusts[0]:g} m/s" if len(gusts) == 1 else f"{gusts[0]:g} to {gusts[-1]:g} m/s"
     turning = sum(e.gusts.rotation for e in found.details.evidences)
-    turn = f" that turn the air in {turning}" if turning else ""
+    turn = f" (turning the air along {turning})" if turning else ""
     more = f", {len(held_out)} held out" if held_out else ""
     return f"{len(flights)} record{'s' * (len(flights) != 1)} of {seconds:.0f} s in all, gusts of {told}{turn}{more}"
 
