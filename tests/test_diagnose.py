@@ -214,6 +214,12 @@ def test_air_that_turns_is_told_from_air_that_reaches_the_tail_later(sigma, rota
     assert gain.sigma == pytest.approx(sigma, rel=0.25)
 
 
+def test_a_clean_aircraft_in_air_that_turns_is_not_blamed():
+    """It was unknown at the rolling moment, 0.94."""
+    found = diagnose([flown("", 0.0, 3, 1.5, True)])
+    assert found.verdict == "no_gap" and found.provenance["records"][0]["rotational_gusts"]
+
+
 def test_air_that_does_not_turn_is_not_taken_to_turn_at_the_start_either():
     flight = reconstruct(flown("", 0.0, 5))
     still, turning = (gains(flight, (0.5,), rotation)[0].with_start() for rotation in (False, True))
