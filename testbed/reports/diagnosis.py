@@ -59,10 +59,10 @@ def _of_what(found: Diagnosis) -> str:
     seconds = sum(len(f.time) * f.dt for f in flights)
     gusts = sorted({round(e.gusts.sigma, 2) for e in found.details.evidences})
     told = f"{gusts[0]:g} m/s" if len(gusts) == 1 else f"{gusts[0]:g} to {gusts[-1]:g} m/s"
-    turning = sum(e.gusts.rotation for e in found.details.evidences)
-    turn = f" (turning the air along {turning})" if turning else ""
+    rotational = sum(e.gusts.rotation for e in found.details.evidences)
+    kind = f" (rotational, after MIL-F-8785C, in {rotational} of {len(flights)})" if rotational else ""
     more = f", {len(held_out)} held out" if held_out else ""
-    return f"{len(flights)} record{'s' * (len(flights) != 1)} of {seconds:.0f} s in all, gusts of {told}{turn}{more}"
+    return f"{len(flights)} record{'s' * (len(flights) != 1)} of {seconds:.0f} s in all, gusts of {told}{kind}{more}"
 
 
 def _explanations(report: Report, result: Mapping[str, Any]) -> None:
