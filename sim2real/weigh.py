@@ -55,11 +55,11 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
         Evidence of every record, the posterior, and the baseline with the spread that the records ask for.
     """
     progress("fitting the model's own uncertainty")
-    rotation = [False] * len(flights)
+    rotation = False
     for _ in range(2):  # once more where it shows that the air turns
         moved, centre, known = followed(flights, candidates, baseline, rotation)
         guess = first_guess(moved, candidates, baseline, untestable, centre, known)
-        if rotation == (rotation := [gain.gusts.rotation for gain in guess]):
+        if rotation == (rotation := guess[0].gusts.rotation):
             break
     flights = moved
     found = _Weighing(flights, candidates, baseline, untestable, centre)

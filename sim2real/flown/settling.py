@@ -35,7 +35,7 @@ DEPARTED = 1e6  # mean whitened square of a model that does not follow the recor
 MOVED = 4.0  # standard deviations by which the model that variants are flown about is moved at most
 
 
-def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline, rotation: Sequence[bool] = ()
+def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline, rotation: bool = False
            ) -> tuple[FloatArray, list[Gain]]:  # fmt: skip
     """Nuisances [n] that fit best where there is no gap, and the gains found on the way.
 
@@ -44,11 +44,11 @@ def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseli
     (two standard deviations in 1.5 m/s, where the noise of the instruments is low).
 
     Args:
-        rotation: along which records the air turns; none if omitted.
+        rotation: whether the air turns.
     """
     only = replace(candidates, families=(), terms=(), size=1 + len(candidates.nuisances))
     centre = np.zeros(len(candidates.nuisances))
-    known = each(_at_first, flights, rotation or [False] * len(flights))
+    known = each(_at_first, flights, [rotation] * len(flights))
     for k in range(SETTLING):
         evidences = gather_about(flights, only, centre, known)
         gram = with_prior(total(evidences), only, baseline.precision, centre)
@@ -69,7 +69,7 @@ def _at_first(flight: Reconstruction, rotation: bool) -> Gain:
 
 
 def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline,
-             rotation: Sequence[bool] = ()) -> tuple[list[Reconstruction], FloatArray, list[Gain]]:
+             rotation: bool = False) -> tuple[list[Reconstruction], FloatArray, list[Gain]]:
     """The records, with the settled model's nuisances [n] and gains; `rotation` as in `settle`.
 
     A model that is no longer corrected enough to keep to a record departs from it, and nothing can be told of what
@@ -111,11 +111,14 @@ def likeliest(flight: Reconstruction, last: Gain, pushed: Sequence[Push] = (), r
         at = _nearest(found.sigma)
 
 
-def likeliest_explained(flight: Reconstruction, last: Gain, pushed: Sequence[Push] = ()) -> Gain:
-    """The same of a model with an explanation in it, which shows whether the air turns."""
-    found = likeliest(flight, last, pushed)
-    rotation = air_turns(flight, found, pushed)
-    return found if rotation == found.gusts.rotation else likeliest(flight, found, pushed, rotation)
+def likeliest_explained(flights: Sequence[Reconstruction], last: Sequence[Gain], pushed: Sequence[Sequence[Push]]
+                        ) -> list[Gain]:  # fmt: skip
+    """The same of a model with an explanation in it, which shows whether the air of the records turns."""
+    found = each(likeliest, flights, last, pushed)
+    rotation = air_turns(flights, found, pushed)
+    if rotation == found[0].gusts.rotation:
+        return found
+    return each(likeliest, flights, found, pushed, [rotation] * len(found))
 
 
 def _nearest(sigma: float) -> int:
@@ -149,7 +152,7 @@ def gains_with(flying: Flying, best: Hypothesis, nuisances: FloatArray, turns: i
     for turn in range(turns):
         moved = [_with(f, candidates, best, nuisances) for f in flying.flights]
         pushed = [_pushed(e, f, candidates, best.pushed) for e, f in zip(flying.evidences, moved, strict=True)]
-        known = each(likeliest_explained, moved, [e.gain for e in flying.evidences], pushed)
+        known = likeliest_explained(moved, [e.gain for e in flying.evidences], pushed)
         if best.pushed or not best.effects or not differ(known, flying.evidences) or turn == turns - 1:
             break
         flying = replace(flying, evidences=each(_in_gusts, flying.evidences, known, moved))

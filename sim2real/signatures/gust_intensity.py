@@ -13,6 +13,7 @@ from sim2real.prediction.predictor import LOST, Push, innovations
 from sim2real.prediction.readings import slow
 from sim2real.records.channels import FED_BACK
 from sim2real.records.reconstruct import Reconstruction
+from sim2real.records.side_by_side import each
 from sim2real.signatures.whitening import SETTLE, factors, whiten
 
 # m/s
@@ -44,27 +45,49 @@ def choose_gain(flight: Reconstruction, sigmas: Sequence[float], pushed: Sequenc
     return gains(flight, (_peak(sigmas[k - 1 : k + 2], scores[k - 1 : k + 2]),), rotation)[0]
 
 
-def air_turns(flight: Reconstruction, found: Gain, pushed: Sequence[Push] = ()) -> bool:
-    """Whether the air turns, by how likely the innovations are with the gusts found and with those of the other kind.
+def air_turns(flights: Sequence[Reconstruction], found: Sequence[Gain], pushed: Sequence[Sequence[Push]]) -> bool:
+    """Whether the air of some records turns, by how likely they are with the gusts found and with the other kind.
 
-    What a gap makes of roll and yaw passes for air that turns, so that this is for a model with an explanation in it,
-    and the log likelihood of a sample has to gain half of what air that turns so much makes of it (15 to 25 per
-    (m/s)^2); no more than of MOST, since what is not understood passes for stronger gusts than there are.
+    The air of a day is of one kind. What a gap makes of roll and yaw passes for air that turns, so that this is for a
+    model with an explanation in it, and the log likelihood of a sample has to gain half of what air that turns so much
+    makes of it (15 to 25 per (m/s)^2); no more than of MOST, since what is not understood passes for stronger gusts
+    than there are.
     Of an aircraft that the model is known to follow poorly, or of which only the strongest gusts make sense, nothing is
     said: what the model lacks passes for air that turns, too.
+
+    Args:
+        found: gains of each record, of gusts of one kind.
+        pushed: generic discrepancies that the model is flown with, of each record.
     """
-    if flight.inadequacy.walk > 1.0 or (found.gusts.rotation and found.sigma == SIGMAS[-1]):
+    turned = found[0].gusts.rotation
+    told = [of for of in zip(flights, found, pushed, strict=True)
+            if of[0].inadequacy.walk <= 1.0 and not (turned and of[1].sigma == SIGMAS[-1])]
+    if not told:
         return False
-    here = likelihoods(flight, [found], pushed)[0]
-    there = likelihoods(flight, gains(flight, (found.sigma,), not found.gusts.rotation), pushed)[0]
-    if found.gusts.rotation:
-        return here - there > max(STILL, 0.5 * TURNING * min(found.sigma, MOST) ** 2)
-    if there - here <= PLAIN:
+    gained = each(_gained, *zip(*told, strict=True))
+    if turned:
+        return -sum(gained) > sum(max(STILL, 0.5 * _asked(gain)) for _, gain, _ in told)
+    if max(gained) <= PLAIN:
         return False
-    turning = choose_gain(flight, SIGMAS, pushed, True)
-    if turning.sigma == SIGMAS[-1]:
-        return False
-    return likelihoods(flight, [turning], pushed)[0] - here > TURNING * min(turning.sigma, MOST) ** 2
+    turning = each(lambda flight, _, push: choose_gain(flight, SIGMAS, push, True), *zip(*told, strict=True))
+    likely = [(*of, gain) for of, gain in zip(told, turning, strict=True) if gain.sigma != SIGMAS[-1]]
+    return sum(_gained_by(*of) for of in likely) > sum(_asked(of[-1]) for of in likely)
+
+
+def _asked(turning: Gain) -> float:
+    """What the log likelihood of a sample gains at least where the air turns as a gain expects it to."""
+    return TURNING * min(turning.sigma, MOST) ** 2
+
+
+def _gained(flight: Reconstruction, found: Gain, pushed: Sequence[Push]) -> float:
+    """What the log likelihood of a sample gains by gusts as strong and of the other kind."""
+    return _gained_by(flight, found, pushed, gains(flight, (found.sigma,), not found.gusts.rotation)[0])
+
+
+def _gained_by(flight: Reconstruction, found: Gain, pushed: Sequence[Push], other: Gain) -> float:
+    """The same by another gain."""
+    here, there = (likelihoods(flight, [gain], pushed)[0] for gain in (found, other))
+    return there - here
 
 
 def likelihoods(flight: Reconstruction, options: Sequence[Gain], pushed: Sequence[Push] = ()) -> list[float]:
