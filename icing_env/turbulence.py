@@ -13,9 +13,10 @@ gust = x1 for u and p. Both are advanced exactly, with the exact covariance of t
 correlation are right at any dt. gust_q = -w'/V and gust_r = +v'/V behind the lag of the span (a field w(x) that grows
 forward is air that pitches down), by the exact response to v and w that are straight lines over dt.
 
-The tail meets the vertical gust tail_arm / V later. Either that delay or the rotational spectra, never both: they
-describe the same variation along the aircraft. The delay is the first-order Pade form
-(1 - s D/2) / (1 + s D/2), which keeps the variance and needs no more memory than the last two outputs.
+The tail meets the vertical gust tail_arm / V later. Either that delay or gust_q, never both: they describe the same
+variation along the aircraft. The delay is the first-order Pade form (1 - s D/2) / (1 + s D/2), which keeps the variance
+and needs no more memory than the last two outputs. Without it and without rotation all of the aircraft meets the gust
+at its c.g., as in many simulators.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ from icing_env.types import Field
 
 TURBULENCE_PARAMETERS: list[Field] = [
     ("turbulence_sigma_w", "m/s", "intensity: standard deviation of the vertical gust"),
-    ("turbulence_tail_delay", "0/1", "1: the tail meets the vertical gust later; 0: rotational gust spectra instead"),
+    ("turbulence_tail_delay", "0/1", "1: the tail meets the vertical gust later, which takes the place of gust_q"),
+    ("turbulence_rotation", "0/1", "1: the air turns: gust_p, gust_r, and gust_q unless the tail meets gusts later"),
     ("gust_start_time", "s", "time at which the discrete gust begins"),
     ("gust_length", "m", "gradient distance of the discrete gust, from its start to its peak"),
     ("gust_amplitude_u", "m/s", "peak of the discrete gust along body x"),
@@ -162,6 +164,8 @@ def put_translation(s: Any) -> None:
 def put_rotation(s: Any, p: Any, airspeed: float) -> None:
     """Gust rotations: the derivative of w and v along the path, by the lags whose states are dryden_q, dryden_r."""
     s.gust_q = -math.pi / (4.0 * p.span) * (transverse(s.dryden_w1, s.dryden_w2) - s.dryden_q)
+    if p.turbulence_tail_delay != 0.0:
+        s.gust_q = 0.0
     s.gust_r = math.pi / (3.0 * p.span) * (transverse(s.dryden_v1, s.dryden_v2) - s.dryden_r)
 
 
@@ -230,20 +234,19 @@ def advance_turbulence(s: Any, p: Any, airspeed: float, dt: float) -> None:
     """
     v = max(airspeed, LOWEST_AIRSPEED)
     total_before = s.gust_w
-    delayed = p.turbulence_tail_delay != 0.0
     if p.turbulence_sigma_w > 0.0:
         v_before, w_before = transverse(s.dryden_v1, s.dryden_v2), transverse(s.dryden_w1, s.dryden_w2)
         advance_translation(s, p.turbulence_sigma_w, v, dt)
         put_translation(s)
-        if delayed:
-            stay_level(s)
-        else:
+        if p.turbulence_rotation != 0.0:
             advance_roll(s, p, v, dt)
             follow_path(s, p, v, dt, v_before, w_before)
+        else:
+            stay_level(s)
     else:
         calm(s)
     add_discrete(s, p, v, dt)
-    if delayed and p.tail_arm > 0.0:
+    if p.turbulence_tail_delay != 0.0 and p.tail_arm > 0.0:
         reach_tail(s, p, v, total_before, dt)
     else:
         s.gust_w_tail = s.gust_w
@@ -265,12 +268,12 @@ def start_turbulence(s: Any, p: Any, airspeed: float) -> None:
     s.dryden_w1, s.dryden_w2 = sigma * n3, 0.5 * sigma * (n3 + n4)
     put_translation(s)
     s.gust_w_tail = s.gust_w
-    if p.turbulence_tail_delay == 0.0:
+    if p.turbulence_rotation != 0.0:
         sigma_p, time_p = roll_spectrum(sigma, length_w, p.span, v)
         s.dryden_p = s.gust_p = sigma_p * n5
         s.dryden_q = stationary_lag(s.dryden_w1, s.dryden_w2, length_w / v, time_p, sigma, n6)
         s.dryden_r = stationary_lag(s.dryden_v1, s.dryden_v2, length_uv / v, 0.75 * time_p, ratio * sigma, n7)
         put_rotation(s, p, v)
-    elif p.tail_arm > 0.0:
+    if p.turbulence_tail_delay != 0.0 and p.tail_arm > 0.0:
         half = stationary_lag(s.dryden_w1, s.dryden_w2, length_w / v, 0.5 * p.tail_arm / v, sigma, n6)
         s.gust_w_tail = 2.0 * half - s.gust_w

@@ -88,7 +88,8 @@ def provenance(flights: Sequence[Reconstruction], others: Sequence[Reconstructio
     """What the answer was made from."""
     return {
         "records": [{"sha256": content_hash(f.record), "samples": len(f.time), "rate_hz": 1.0 / f.dt,
-                     "sigma_w": e.gusts.sigma, "rotational_gusts": e.gusts.rotation, "notes": list(f.notes)}
+                     "sigma_w": e.gusts.sigma, "rotational_gusts": e.gusts.kind.rotation,
+                     "tail_meets_gusts_later": e.gusts.kind.tail_delay, "notes": list(f.notes)}
                     for f, e in zip(flights, evidences, strict=True)],
         "held_out": [{"sha256": content_hash(f.record), "samples": len(f.time), "notes": list(f.notes)}
                      for f in others],

@@ -30,6 +30,7 @@ from sim2real.prediction.kalman import Gain
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.courses import Course, Courses
 from sim2real.signatures.evidence import Evidence
+from sim2real.signatures.gust_intensity import kind_at_first
 from sim2real.signatures.tempering import noise, temper, total
 
 RELINEARISE = 8.0  # whitened distance of the fitted nuisances beyond which all is flown again about them
@@ -55,11 +56,11 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
         Evidence of every record, the posterior, and the baseline with the spread that the records ask for.
     """
     progress("fitting the model's own uncertainty")
-    rotation = False
-    for _ in range(2):  # once more where it shows that the air turns
-        moved, centre, known = followed(flights, candidates, baseline, rotation)
+    kind = kind_at_first(flights)
+    for _ in range(2):  # once more where gusts show to be of another kind
+        moved, centre, known = followed(flights, candidates, baseline, kind)
         guess = first_guess(moved, candidates, baseline, untestable, centre, known)
-        if rotation == (rotation := guess[0].gusts.rotation):
+        if kind == (kind := guess[0].gusts.kind):
             break
     flights = moved
     found = _Weighing(flights, candidates, baseline, untestable, centre)

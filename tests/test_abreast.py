@@ -9,6 +9,7 @@ import pytest
 
 from icing_env import scenario
 from sim2real.prediction.abreast import Abreast
+from sim2real.prediction.gusts import KINDS
 from sim2real.prediction.kalman import Gain, follow
 from sim2real.prediction.predictor import Push, innovations
 from sim2real.records.reconstruct import Reconstruction, reconstruct
@@ -20,19 +21,21 @@ from testbed.flight import fly
 def records() -> list[tuple[Reconstruction, Gain]]:
     found = []
     for seed, duration, every in ((3, 20.0, 1), (4, 14.0, 1), (5, 16.0, 2)):  # lengths and rates
-        weather = {"turbulence_sigma_w": 0.5, "turbulence_tail_delay": float(seed != 4)}
+        kind = KINDS[seed - 3]
+        weather = {"turbulence_sigma_w": 0.5, "turbulence_tail_delay": float(kind.tail_delay),
+                   "turbulence_rotation": float(kind.rotation)}
         chosen = scenario.load("clear_air", duration=duration, parameters=weather)
         record = fly(chosen, seed=seed, observer=False, protection=False).record
         slow = replace(record, channels={n: c[::every] for n, c in record.channels.items()})
         flight = reconstruct(slow)
-        found.append((flight, follow(flight, choose_gain(flight, SIGMAS, (), seed == 4))))
+        found.append((flight, follow(flight, choose_gain(flight, SIGMAS, (), kind))))
     return found
 
 
 @pytest.mark.parametrize("counts", [(1, 1, 1), (2, 3, 1), (9, 8, 2)])
 def test_to_the_bit(records: list[tuple[Reconstruction, Gain]], counts: tuple[int, ...]) -> None:
     flights, own = [f for f, _ in records], [g for _, g in records]
-    assert [g.gusts.rotation for g in own] == [False, True, False]
+    assert [g.gusts.kind for g in own] == list(KINDS[:3])
     rows, pushes = [], []
     for flight, count in zip(flights, counts, strict=True):
         varied = np.repeat(flight.parameters, count)
@@ -42,4 +45,4 @@ def test_to_the_bit(records: list[tuple[Reconstruction, Gain]], counts: tuple[in
         pushes.append((Push(count - 1, "q", 0.01 * course, False), Push(0, "alpha", 0.002 * course, True)))
     together = Abreast(flights, own).innovations(rows, pushes)
     for flight, gain, some, pushed, found in zip(flights, own, rows, pushes, together, strict=True):
-        np.testing.assert_array_equal(found, innovations(flight, some, gain.K, pushed, gain.gusts.rotation))
+        np.testing.assert_array_equal(found, innovations(flight, some, gain.K, pushed, gain.gusts.kind))

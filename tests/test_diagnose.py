@@ -16,15 +16,11 @@ from sim2real.actuators.timing import in_step
 from sim2real.answer import credible
 from sim2real.closing import gap
 from sim2real.diagnosis import Diagnosis, diagnose
-from sim2real.flown.settling import likeliest_explained
 from sim2real.library.candidates import bank, nodes, nuisances, unbroken
 from sim2real.library.sizes import piece_prior, size_prior
-from sim2real.prediction.correction import ROTATION
 from sim2real.prediction.kalman import gains, linearise
-from sim2real.prediction.predictor import TANGENT, innovations
 from sim2real.records.channels import FED_BACK
 from sim2real.records.reconstruct import SHORTEST, reconstruct, unfiltered
-from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
 from sim2real.signatures.whitening import SETTLE
 from testbed.cli import _run
 from testbed.commands.diagnose import answer
@@ -35,11 +31,9 @@ KEYS = {"verdict", "hypotheses", "credible_set_95", "where", "effects", "not_tes
 
 
 @cache
-def flown(effect: str = "", value: float = 0.0, seed: int = 0, sigma: float = 0.5, rotation: bool = False
-          ) -> FlightRecord:  # fmt: skip
+def flown(effect: str = "", value: float = 0.0, seed: int = 0, sigma: float = 0.5) -> FlightRecord:
     name, _, parameter = effect.partition(":")
-    weather = {"turbulence_sigma_w": sigma, "turbulence_tail_delay": float(not rotation)}
-    chosen = scenario.load("clear_air", duration=52.0, parameters=weather,
+    chosen = scenario.load("clear_air", duration=52.0, parameters={"turbulence_sigma_w": sigma},
                            effects={name: {parameter: value}} if name else {})  # fmt: skip
     return fly(chosen, seed=seed, observer=False, protection=False).record
 
@@ -190,50 +184,6 @@ def test_a_record_without_what_is_needed_is_refused():
     short = FlightRecord({n: v for n, v in record.channels.items() if n != "theta"}, RecordMeta(name="x"))
     with pytest.raises(InputError, match="lacks theta"):
         diagnose([short])
-
-
-@pytest.mark.parametrize("rotation", [False, True])
-@pytest.mark.parametrize("sigma", [0.5, 1.5])
-def test_innovations_of_the_true_model_are_white_and_of_their_predicted_size(sigma, rotation):
-    """At 1.5 m/s the gusts double the apparent noise of az, which must not be taken for noise."""
-    flight = reconstruct(flown("", 0.0, 5, sigma, rotation))
-    gain = gains(flight, (sigma,), rotation)[0].with_start()
-    left = innovations(flight, flight.parameters, gain.K, (), rotation)[200:, 0, :11].astype(float)
-    size = np.mean(left**2, axis=0) / np.diag(gain.S)[:11]
-    assert np.all((size > 0.6) & (size < 1.3))
-    following = [np.corrcoef(c[1:], c[:-1])[0, 1] for c in left.T]
-    assert np.max(np.abs(following)) < 0.2
-
-
-@pytest.mark.parametrize(("sigma", "rotation"), [(0.5, True), (1.5, False), (1.5, True)])
-def test_air_that_turns_is_told_from_air_that_reaches_the_tail_later(sigma, rotation):
-    """Taken for the other, its gusts are found nearly twice as strong, and something unknown at the rolling moment."""
-    flight = reconstruct(flown("", 0.0, 5, sigma, rotation))
-    (gain,) = likeliest_explained([flight], [choose_gain(flight, SIGMAS)], [()])
-    assert gain.gusts.rotation == rotation
-    assert gain.sigma == pytest.approx(sigma, rel=0.25)
-
-
-def test_the_air_of_all_records_is_of_the_kind_that_most_of_them_say():
-    """One record by itself is sometimes wrong: here it is one whose air turns in truth."""
-    flights = [reconstruct(flown("", 0.0, 5 + k, 1.0, k == 0)) for k in range(3)]
-    found = likeliest_explained(flights, [choose_gain(f, SIGMAS) for f in flights], [()] * 3)
-    assert not any(gain.gusts.rotation for gain in found)
-    assert likeliest_explained(flights[:1], [choose_gain(flights[0], SIGMAS)], [()])[0].gusts.rotation
-
-
-def test_a_clean_aircraft_in_air_that_turns_is_not_blamed():
-    """It was unknown at the rolling moment, 0.94."""
-    found = diagnose([flown("", 0.0, 3, 1.5, True)])
-    assert found.verdict == "no_gap" and found.provenance["records"][0]["rotational_gusts"]
-
-
-def test_air_that_does_not_turn_is_not_taken_to_turn_at_the_start_either():
-    flight = reconstruct(flown("", 0.0, 5))
-    still, turning = (gains(flight, (0.5,), rotation)[0].with_start() for rotation in (False, True))
-    at = [TANGENT.index(name) for name in ROTATION]
-    assert not still.start[at].any() and not still.K[:, at].any()
-    assert np.diag(turning.start)[at].all() and turning.K[:, at].any(axis=(0, 2)).all()
 
 
 def test_the_predictor_forgets_its_start():

@@ -29,7 +29,7 @@ def world(rows: NDArray | list[int], weather: bool = True) -> tuple[NDArray, NDA
     names = ["stratiform", "cumuliform", "large_drops"] if weather else ["clear"]
     p = np.concatenate([load(weather=names[i % len(names)]) for i in index])
     if weather:
-        p["turbulence_sigma_w"], p["turbulence_tail_delay"] = 1.5, index % 2
+        p["turbulence_sigma_w"], p["turbulence_tail_delay"], p["turbulence_rotation"] = 1.5, index % 2, index % 3 < 2
         p["cloud_gap_mean"], p["shed_rate"] = 200.0, 5.0
         p["temperature_offset"] = -8.0
     p["mass"] += 3.0 * index

@@ -21,7 +21,7 @@ from testbed import cli
 from testbed.withheld import gusts, instruments
 from testbed.withheld import plant as pl
 from testbed.withheld.files import record_text
-from testbed.withheld.jsbsim_cases import TAIL_ARM, aircraft, designs, side_text, without_levers
+from testbed.withheld.jsbsim_cases import aircraft, designs, side_text, without_levers
 from testbed.withheld.jsbsim_changes import BY_NAME
 from testbed.withheld.jsbsim_edit import AERO, data_root
 from testbed.withheld.jsbsim_flight import Aircraft, Flight, fly
@@ -157,7 +157,7 @@ def reconstructed(folder: Path, plans: Sequence[int], sigma: float) -> list[Reco
     plane, flights = aircraft(ROOT), []
     for i in plans:
         manoeuvre, rng = PLANS[0][i], np.random.default_rng(i)
-        gust = gusts.draw(len(inputs(manoeuvre)) - 1, sigma, 1.0, manoeuvre.speed, TAIL_ARM, rng)
+        gust = gusts.draw(len(inputs(manoeuvre)) - 1, sigma, 1.0, manoeuvre.speed, rng)
         flight = fly(plane, manoeuvre, 1.0, gust)
         channels = instruments.read(flight.channels, 1.0, rng)
         (folder / f"{i}.csv").write_text(without_levers(record_text(channels, flight.commands)))

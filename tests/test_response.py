@@ -10,6 +10,7 @@ import pytest
 from icing_env import scenario
 from sim2real.library.candidates import bank
 from sim2real.library.terms import at_any_time, pushes
+from sim2real.prediction.gusts import KINDS, LATER
 from sim2real.prediction.kalman import follow
 from sim2real.prediction.predictor import Push
 from sim2real.records.reconstruct import reconstruct
@@ -19,15 +20,16 @@ from sim2real.signatures.response import Filter
 from testbed.flight import fly
 
 
-@pytest.fixture(scope="module", params=[(0.0, False), (1.5, False), (1.5, True)])
+@pytest.fixture(scope="module", params=[(0.0, LATER), *((1.5, kind) for kind in KINDS)])
 def evidence(request) -> Evidence:
-    sigma, rotation = request.param
-    weather = {"turbulence_sigma_w": sigma, "turbulence_tail_delay": float(not rotation)}
+    sigma, kind = request.param
+    weather = {"turbulence_sigma_w": sigma, "turbulence_tail_delay": float(kind.tail_delay),
+               "turbulence_rotation": float(kind.rotation)}
     chosen = scenario.load("clear_air", duration=25.0, parameters=weather)
     flight = reconstruct(fly(chosen, seed=7, observer=False, protection=False).record)
     flight.measured[1::5, 0] = np.nan  # a reading that is missing now and then
     model = replace(bank(), families=(), terms=(), nuisances=(), size=1)
-    return gather(flight, model, follow(flight, choose_gain(flight, SIGMAS, (), rotation)))
+    return gather(flight, model, follow(flight, choose_gain(flight, SIGMAS, (), kind)))
 
 
 def both(evidence: Evidence, pushed: tuple[Push, ...]) -> tuple[np.ndarray, np.ndarray]:

@@ -220,7 +220,7 @@ FLIGHTS = {  # aircraft, changed numbers, power lost on the left, elevator pulle
     "iced": ("twin_otter", {"turbulence_sigma_w": 1.5, "wind_north": 8.0, "wind_north_shear": 0.004, "cg_shift_x": 0.05,
                             "cg_shift_y": 0.03}, 0.0, 0.0),
     "one engine": ("twin_otter_flight", {"turbulence_sigma_w": 2.0, "turbulence_tail_delay": 0.0, "wind_east": 10.0,
-                                         "wind_down": -1.0}, 0.4, 0.0),
+                                         "turbulence_rotation": 1.0, "wind_down": -1.0}, 0.4, 0.0),
     "stall": ("twin_otter", {"turbulence_sigma_w": 1.0}, 0.0, 0.25),
 }  # fmt: skip
 SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("one engine", "stall")]

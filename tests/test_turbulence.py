@@ -35,7 +35,7 @@ def setting(n: int = 1, altitude: float = 2000.0, **values: float) -> tuple[np.n
     states, parameters = np.zeros(n, STATE).view(np.recarray), np.zeros(1, PARAMETERS).view(np.recarray)
     states["seed"], states["altitude"] = np.arange(n) + 3, altitude
     parameters["span"], parameters["tail_arm"], parameters["turbulence_sigma_w"] = SPAN, ARM, 1.0
-    for name, value in values.items():
+    for name, value in {"turbulence_rotation": 1.0, **values}.items():
         parameters[name] = value
     return states, parameters
 
@@ -69,9 +69,10 @@ def test_variance_is_the_stated_one_at_any_step(dt: float, altitude: float) -> N
     assert gusts[:, 3].std() == pytest.approx(expected_p, rel=0.025)
 
 
+@pytest.mark.parametrize("rotation", [0.0, 1.0])
 @pytest.mark.parametrize("delay", [0.0, 1.0])
-def test_start_is_stationary(delay: float) -> None:
-    states, parameters = setting(20_000, turbulence_tail_delay=delay)
+def test_start_is_stationary(delay: float, rotation: float) -> None:
+    states, parameters = setting(20_000, turbulence_tail_delay=delay, turbulence_rotation=rotation)
     start(states, parameters, V)
     before = np.cov(filters(states))
     out = np.empty((25, 7))
@@ -121,7 +122,7 @@ def test_pitching_and_yawing_air_follow_the_path_derivative() -> None:
 
 
 def test_tail_meets_the_gust_later_and_no_weaker() -> None:
-    gusts = history(400_000, 0.01, turbulence_tail_delay=1.0)
+    gusts = history(400_000, 0.01, turbulence_tail_delay=1.0, turbulence_rotation=0.0)
     tail, wing = gusts["gust_w_tail"], gusts["gust_w"]
     assert tail.std() == pytest.approx(wing.std(), rel=0.01)
     low = signal.butter(4, 1.0, fs=100.0, output="sos")
@@ -134,9 +135,18 @@ def test_tail_meets_the_gust_later_and_no_weaker() -> None:
     assert not gusts["gust_r"].any()
 
 
-def test_rotational_mode_has_no_delay() -> None:
-    gusts = history(100, 0.02, turbulence_tail_delay=0.0)
+@pytest.mark.parametrize("rotation", [0.0, 1.0])
+def test_the_tail_meets_the_gust_at_once_without_a_delay(rotation: float) -> None:
+    gusts = history(100, 0.02, turbulence_tail_delay=0.0, turbulence_rotation=rotation)
     assert np.array_equal(gusts["gust_w_tail"], gusts["gust_w"])
+    assert all(gusts[name].any() == (rotation > 0.0) for name in ("gust_p", "gust_q", "gust_r"))
+
+
+def test_the_delay_takes_the_place_of_the_pitching_gust_alone() -> None:
+    """Both would count the same variation along the aircraft twice; rolling and yawing gusts are as without it."""
+    delayed, turning = (history(100, 0.02, turbulence_tail_delay=delay) for delay in (1.0, 0.0))
+    assert not delayed["gust_q"].any() and turning["gust_q"].any()
+    assert all(np.array_equal(delayed[name], turning[name]) for name in ("gust_p", "gust_r", "gust_u", "gust_w"))
 
 
 @pytest.mark.parametrize("delay", [0.0, 1.0])

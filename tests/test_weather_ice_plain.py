@@ -40,6 +40,7 @@ def flown(rows: list[int], steps: int = 60) -> tuple[np.ndarray, np.ndarray]:
     index = np.array(rows)
     states["seed"], states["altitude"] = index + 2**40, 1300.0 + 100.0 * index
     parameters["turbulence_sigma_w"], parameters["turbulence_tail_delay"] = 1.5, index % 2
+    parameters["turbulence_rotation"] = index % 4 < 3
     parameters["shed_rate"], parameters["gust_amplitude_w"] = 10.0, 3.0
     parameters["cloud_gap_mean"] = 500.0
     commands["boots_wing"], commands["prop_heat"] = index % 2, 1.0

@@ -16,7 +16,7 @@ from icing_env.record import read
 from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import _reconstructed
 from sim2real.prediction.as_predicted import as_predicted
-from sim2real.prediction.gusts import gust_noise
+from sim2real.prediction.gusts import KINDS, Gusts
 from sim2real.prediction.kalman import _within_steps, follow, gains, linearise, roughness
 from sim2real.prediction.predictor import TANGENT, Predictor, innovations
 from sim2real.prediction.readings import apart
@@ -25,8 +25,9 @@ from sim2real.records.noise import step_noise
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
 from sim2real.signatures.whitening import SETTLE, whiten, whitening
-from testbed.withheld import instruments
+from testbed.withheld import conditions, instruments
 from testbed.withheld import plant as pl
+from testbed.withheld.conditions import Conditions
 from testbed.withheld.files import record_text, side_text
 from testbed.withheld.flights import Aircraft, fly, turbulence
 from testbed.withheld.manoeuvres import PLANS
@@ -36,22 +37,23 @@ FELT = MEASURED[:11]
 RATES = [MEASURED.index(name) for name in ("p", "q", "r")]
 
 
-def flown(folder, sigma: float, seed: int) -> Reconstruction:
+def flown(folder, sigma: float, seed: int, gusts: str = "later") -> Reconstruction:
     """The published aircraft, with good instruments."""
     manoeuvre, rng = PLANS[seed % len(PLANS)][seed % 3], np.random.default_rng(seed)
-    flight = fly(Aircraft(), manoeuvre, 1.0, turbulence(manoeuvre, sigma, 1.0, rng))
+    flight = fly(Aircraft(), manoeuvre, 1.0, turbulence(manoeuvre, Conditions(sigma, 1.0, 1.0, gusts), rng))
     (folder / "1.csv").write_text(record_text(instruments.read(flight.channels, LEVEL, rng), flight.commands))
     (folder / "1.toml").write_text(side_text("x", "diagnose"))
     return _reconstructed([read(folder / "1.csv")], Baseline(load(), np.eye(1)), None)[0]
 
 
-@pytest.mark.parametrize("sigma", [SIGMAS[0], 0.5, 1.5])
-def test_innovations_of_a_known_aircraft_are_white(tmp_path, sigma):
-    white = []
+@pytest.mark.parametrize(("sigma", "gusts"), [(SIGMAS[0], "later"), (0.5, "later"), (1.5, "later"), (0.5, "turning"),
+                                              (1.5, "at_once"), (0.5, "rolling")])  # fmt: skip
+def test_innovations_of_a_known_aircraft_are_white(tmp_path, sigma, gusts):
+    white, kind = [], KINDS[conditions.KINDS.index(gusts)]
     for seed in range(SEEDS):
-        flight = flown(tmp_path, sigma if sigma > SIGMAS[0] else 0.0, seed)
-        gain = follow(flight, gains(flight, (sigma,))[0])
-        left = innovations(flight, flight.parameters, gain.K)
+        flight = flown(tmp_path, sigma if sigma > SIGMAS[0] else 0.0, seed, gusts)
+        gain = follow(flight, gains(flight, (sigma,), kind)[0])
+        left = innovations(flight, flight.parameters, gain.K, (), kind)
         v = whiten(left, whitening(left[:, 0], gain, flight))[round(SETTLE / flight.dt) :, 0, : len(FELT)]
         white.append(v[: len(v) // BLOCK * BLOCK].reshape(-1, BLOCK, len(FELT)))
     blocks = np.concatenate([w.mean(axis=1) for w in white])
@@ -126,7 +128,7 @@ def slowly(flight: Reconstruction, slow: tuple[str, ...]) -> Reconstruction:
     kept_few = kept(flight, dict.fromkeys(slow, slice(0, None, 5)))
     A, C, _ = (matrix[0] for matrix in linearise(flight))
     columns = [i for i, name in enumerate(TANGENT) if name.startswith("dryden")]
-    Qw = gust_noise(1.5, float(np.median(flight.channel("airspeed"))), float(np.median(flight.altitude)), flight.dt)
+    Qw = Gusts(1.5).noise(flight)
     own, shown = (roughness(A, C[:FED_BACK], A[:, columns], C[:FED_BACK, columns], Qw, apart(f))
                   for f in (flight, kept_few))  # fmt: skip
     noise = flight.noise.copy()
@@ -138,7 +140,7 @@ def test_a_slow_channel_whose_samples_differ_by_gusts_is_not_taken_for_exact(tmp
     flight = kept(flown(tmp_path, 1.5, 0), {"alpha": slice(0, None, 5)})
     gain = gains(flight, (1.5,))[0]
     D = gain.model[1][:, [i for i, name in enumerate(TANGENT) if name.startswith("dryden")]]
-    Qw = gust_noise(1.5, float(np.median(flight.channel("airspeed"))), float(np.median(flight.altitude)), flight.dt)
+    Qw = Gusts(1.5).noise(flight)
     own = np.sqrt(0.2 * np.diag(gain.model[3] - D @ Qw @ D.T)[1])
     assert own == pytest.approx(0.5 * flight.noise[1], rel=1e-3)
 
@@ -170,13 +172,13 @@ def test_predictions_where_a_slow_altitude_is_absent_are_numbers(tmp_path):
 
 def test_gusts_between_samples_disturb_as_much_as_flights_show(tmp_path):
     manoeuvre, rng = PLANS[0][0], np.random.default_rng(1)
-    gust = turbulence(manoeuvre, 1.0, 1.0, rng)
+    gust = turbulence(manoeuvre, Conditions(1.0, 1.0, 1.0), rng)
     at = np.arange(len(gust))
     straight = np.column_stack([np.interp(at, at[:: pl.SUB], column[:: pl.SUB]) for column in gust.T])
     one, other = (fly(Aircraft(), manoeuvre, 1.0, g).states for g in (gust, straight))
     flight = flown(tmp_path, 0.0, 0)
     A = linearise(flight)[0][0]
-    expected = _within_steps(A, gust_noise(1.0, manoeuvre.speed, float(np.median(flight.altitude)), flight.dt))
+    expected = _within_steps(A, Gusts(1.0).noise(flight), Gusts(1.0), flight)
     for name, column in (("p", pl.P), ("q", pl.Q), ("r", pl.R)):
         apart = float(np.std(np.diff(one[:, column] - other[:, column])))
         j = TANGENT.index(name)

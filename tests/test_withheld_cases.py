@@ -12,6 +12,7 @@ import pytest
 from icing_env import record
 from testbed.benchmarks.diagnosis import kind_of
 from testbed.withheld import draw, effects, files, flights, generate, separation, strangers, unknown
+from testbed.withheld.conditions import Conditions
 from testbed.withheld.manoeuvres import PLANS
 from testbed.withheld.published import airframe
 from testbed.withheld.shadow import shadow
@@ -21,7 +22,7 @@ NULL = draw.Design("null", (), 0, 1.0, 0.5, 1.3, 1.0, {}, 7)
 
 @pytest.fixture(scope="module")
 def shape() -> separation.Geometry:
-    return separation.geometry(0, 1.0, 0.5, 1.3, 1.0)
+    return separation.geometry(0, 1.0, Conditions(0.5, 1.3, 1.0))
 
 
 @pytest.fixture
@@ -168,21 +169,24 @@ def test_records_are_drawn_again_beside_their_keys(tmp_path, only_nulls):
 
 
 def test_names_of_a_sealed_set_are_random_and_in_no_order(tmp_path, only_nulls):
-    first, _, known = generate._roll(tmp_path / "a.json", 40, None)
-    second, *_ = generate._roll(tmp_path / "b.json", 40, None)
+    of = draw.Population
+    strangers, wide, mixed = of(strangers=True), of(spread=0.08), of(gusts="mixed")
+    first, _, known = generate._roll(tmp_path / "a.json", 40, None, draw.USUAL)
+    second, *_ = generate._roll(tmp_path / "b.json", 40, None, draw.USUAL)
     assert not known
     assert not set(first) & set(second)
     assert first != sorted(first)
-    assert generate._roll(tmp_path / "a.json", 40, None)[0] == first
+    assert generate._roll(tmp_path / "a.json", 40, None, draw.USUAL)[0] == first
     with pytest.raises(ValueError, match="another seed"):
-        generate._roll(tmp_path / "a.json", 41, None)
+        generate._roll(tmp_path / "a.json", 41, None, draw.USUAL)
     with pytest.raises(ValueError, match="another seed"):  # a sealed set is not finished as a development set
-        generate._roll(tmp_path / "a.json", 40, 3)
+        generate._roll(tmp_path / "a.json", 40, 3, draw.USUAL)
     with pytest.raises(ValueError, match="another seed"):  # nor as one of strangers
-        generate._roll(tmp_path / "a.json", 40, None, strangers=True)
-    with pytest.raises(ValueError, match="or spread"):
-        generate._roll(tmp_path / "a.json", 40, None, spread=0.08)
-    assert len(generate._roll(tmp_path / "c.json", 40, None, strangers=True)[0]) == 40
+        generate._roll(tmp_path / "a.json", 40, None, strangers)
+    for other in (wide, mixed):
+        with pytest.raises(ValueError, match="spread or gusts"):
+            generate._roll(tmp_path / "a.json", 40, None, other)
+    assert len(generate._roll(tmp_path / "c.json", 40, None, strangers)[0]) == 40
 
 
 def test_derivatives_of_another_spread_are_off_by_as_many_deviations():
@@ -195,7 +199,7 @@ def test_derivatives_of_another_spread_are_off_by_as_many_deviations():
 
 
 def test_a_set_of_another_spread_says_so(tmp_path, only_nulls):
-    sealed = generate.generate(tmp_path, 3, 11, spread=0.08)
+    sealed = generate.generate(tmp_path, 3, 11, population=draw.Population(spread=0.08))
     assert sealed["spread"] == 0.08 and kind_of(sealed) == "development spread 0.08"
     as_published = generate.generate(tmp_path / "published", 3, 11)
     assert "spread" not in as_published and kind_of(as_published) == "development"

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from testbed.withheld import draw, generate, refly, windows
+from testbed.withheld.conditions import Conditions
 from testbed.withheld.effects import BY_NAME
 from testbed.withheld.flights import Aircraft, recorded
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
@@ -95,11 +96,11 @@ def test_terms_about_a_condition_are_those_of_the_library():
 
 
 def test_noise_alone_is_no_gap_and_the_start_is_fitted():
-    manoeuvre, air = PLANS[0][DIAGNOSED], (0.5, 1.0, 1.0)
+    manoeuvre, air = PLANS[0][DIAGNOSED], Conditions(0.5, 1.0, 1.0)
     own, noise = windows.own_noise((manoeuvre,), 1.0, air)
     flight = windows.held(*recorded(Aircraft(), manoeuvre, 1.0, air, np.random.default_rng(99)))
     assert windows.gap_of(Aircraft(), [flight], own) < 3.0 * noise < 0.3
-    calm = windows.held(*recorded(Aircraft(), manoeuvre, 1.0, (0.0, 1.0, 0.0), np.random.default_rng(1)))
+    calm = windows.held(*recorded(Aircraft(), manoeuvre, 1.0, Conditions(0.0, 1.0, 0.0), np.random.default_rng(1)))
     still = np.sqrt(windows.residual_energy(Aircraft(), calm))
     assert np.max(still) < 0.05  # instruments settle at the start of each window; nothing else differs
     calm.states[:, windows.FREE] *= 1.02  # a worse guess of where windows begin

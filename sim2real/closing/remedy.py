@@ -106,7 +106,7 @@ def resimulation(change: Remedy, training: gap.Energy, flights: Sequence[Reconst
         starts.append(training.starts[at])
         at += len(cut(flight).first)
     records = [{"initial_state": dict(zip(FREE, (float(v) for v in start), strict=True)),
-                "wind": {"sigma_w": evidence.gusts.sigma, "rotation": evidence.gusts.rotation}, "biases": {}}
+                "wind": {"sigma_w": evidence.gusts.sigma, **evidence.gusts.kind._asdict()}, "biases": {}}
                for start, evidence in zip(starts, evidences, strict=True)]
     return {"command": change.command, "records": records,
             "parameter_covariance": None if change.covariance is None else np.asarray(change.covariance).tolist(),

@@ -17,13 +17,14 @@ from sim2real.library.terms import pushes
 from sim2real.posterior.attribution import nuisance_mean, reduce, with_prior
 from sim2real.posterior.hypotheses import Hypothesis
 from sim2real.prediction.as_predicted import as_predicted
+from sim2real.prediction.gusts import LATER, Kind
 from sim2real.prediction.kalman import Gain, follow
 from sim2real.prediction.predictor import Push, innovations
 from sim2real.prediction.readings import slow
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.records.side_by_side import each
 from sim2real.signatures.evidence import Evidence, gather
-from sim2real.signatures.gust_intensity import SIGMAS, air_turns, choose_gain
+from sim2real.signatures.gust_intensity import SIGMAS, choose_gain, kind_of_gusts
 from sim2real.signatures.tempering import temper, total
 from sim2real.signatures.whitening import whitening
 
@@ -35,7 +36,7 @@ DEPARTED = 1e6  # mean whitened square of a model that does not follow the recor
 MOVED = 4.0  # standard deviations by which the model that variants are flown about is moved at most
 
 
-def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline, rotation: bool = False
+def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline, kind: Kind = LATER
            ) -> tuple[FloatArray, list[Gain]]:  # fmt: skip
     """Nuisances [n] that fit best where there is no gap, and the gains found on the way.
 
@@ -44,11 +45,11 @@ def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseli
     (two standard deviations in 1.5 m/s, where the noise of the instruments is low).
 
     Args:
-        rotation: whether the air turns.
+        kind: of the gusts.
     """
     only = replace(candidates, families=(), terms=(), size=1 + len(candidates.nuisances))
     centre = np.zeros(len(candidates.nuisances))
-    known = each(_at_first, flights, [rotation] * len(flights))
+    known = each(_at_first, flights, [kind] * len(flights))
     for k in range(SETTLING):
         evidences = gather_about(flights, only, centre, known)
         gram = with_prior(total(evidences), only, baseline.precision, centre)
@@ -62,22 +63,22 @@ def settle(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseli
     return centre, known
 
 
-def _at_first(flight: Reconstruction, rotation: bool) -> Gain:
+def _at_first(flight: Reconstruction, kind: Kind) -> Gain:
     """The gain of the record's likeliest gusts, along it where a channel is slow."""
-    found = choose_gain(flight, SIGMAS, (), rotation)
+    found = choose_gain(flight, SIGMAS, (), kind)
     return follow(flight, found) if slow(flight) else found.with_start()
 
 
 def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline,
-             rotation: bool = False) -> tuple[list[Reconstruction], FloatArray, list[Gain]]:
-    """The records, with the settled model's nuisances [n] and gains; `rotation` as in `settle`.
+             kind: Kind = LATER) -> tuple[list[Reconstruction], FloatArray, list[Gain]]:
+    """The records, with the settled model's nuisances [n] and gains; arguments as in `settle`.
 
     A model that is no longer corrected enough to keep to a record departs from it, and nothing can be told of what
     departs. Its filter has to expect more noise, though some of a gap may pass for that.
     """
     for least in WALKS:
         flights = [replace(f, inadequacy=f.inadequacy.with_walk(least)) for f in flights]
-        centre, known = settle(flights, candidates, baseline, rotation)
+        centre, known = settle(flights, candidates, baseline, kind)
         if not departs(model_alone(flights, candidates, centre, known)):
             break
     return list(flights), centre, known
@@ -95,17 +96,17 @@ def departs(evidences: Sequence[Evidence]) -> bool:
     return any(not float(e.gram[0, 0]) < DEPARTED * e.samples for e in evidences)
 
 
-def likeliest(flight: Reconstruction, last: Gain, pushed: Sequence[Push] = (), rotation: bool | None = None) -> Gain:
+def likeliest(flight: Reconstruction, last: Gain, pushed: Sequence[Push] = (), kind: Kind | None = None) -> Gain:
     """The gain along a record with the gust intensity that is likeliest, sought from where it was found last.
 
     Args:
         pushed: generic discrepancies in the model.
-        rotation: whether the air turns; as it was found last if omitted.
+        kind: of the gusts; as it was found last if omitted.
     """
-    at, rotation = _nearest(last.sigma), last.gusts.rotation if rotation is None else rotation
+    at, kind = _nearest(last.sigma), kind or last.gusts.kind
     while True:
         tried = SIGMAS[max(at - NEAR, 0) : at + NEAR + 1]
-        found = choose_gain(flight, tried, pushed, rotation)
+        found = choose_gain(flight, tried, pushed, kind)
         if found.sigma not in (tried[0], tried[-1]) or found.sigma in (SIGMAS[0], SIGMAS[-1]):
             return follow(flight, found)
         at = _nearest(found.sigma)
@@ -113,12 +114,12 @@ def likeliest(flight: Reconstruction, last: Gain, pushed: Sequence[Push] = (), r
 
 def likeliest_explained(flights: Sequence[Reconstruction], last: Sequence[Gain], pushed: Sequence[Sequence[Push]]
                         ) -> list[Gain]:  # fmt: skip
-    """The same of a model with an explanation in it, which shows whether the air of the records turns."""
+    """The same of a model with an explanation in it, which shows of what kind the gusts of the records are."""
     found = each(likeliest, flights, last, pushed)
-    rotation = air_turns(flights, found, pushed)
-    if rotation == found[0].gusts.rotation:
+    kind = kind_of_gusts(flights, found, pushed)
+    if kind == found[0].gusts.kind:
         return found
-    return each(likeliest, flights, found, pushed, [rotation] * len(found))
+    return each(likeliest, flights, found, pushed, [kind] * len(found))
 
 
 def _nearest(sigma: float) -> int:
@@ -174,7 +175,7 @@ def _with(flight: Reconstruction, candidates: Bank, best: Hypothesis, nuisances:
 
 def _in_gusts(evidence: Evidence, gain: Gain, flight: Reconstruction) -> Evidence:
     """Gain and whitening of one record where its gusts are others; what was flown is as it was."""
-    left = innovations(flight, flight.parameters, gain.K, (), gain.gusts.rotation)[:, 0]
+    left = innovations(flight, flight.parameters, gain.K, (), gain.gusts.kind)[:, 0]
     return replace(evidence, gain=gain, factor=whitening(left, gain, flight))
 
 
@@ -184,7 +185,7 @@ def _pushed(evidence: Evidence, flight: Reconstruction, candidates: Bank, weight
     if not terms:
         return []
     gain = evidence.gain
-    left = innovations(flight, flight.parameters, gain.K, (), gain.gusts.rotation)[:, 0]
+    left = innovations(flight, flight.parameters, gain.K, (), gain.gusts.kind)[:, 0]
     return [replace(push, series=weights[push.row] * push.series)
             for push in pushes(as_predicted(flight, left, gain), terms)]
 

@@ -58,12 +58,12 @@ def responses(evidence: Evidence, rows: NDArray, cut: NDArray[np.intp]) -> tuple
         nuisance makes of the channels [N x channels, n or more].
     """
     flight, k, first = evidence.flight, rows.shape[1] - 1, int(cut[0])
-    turns = evidence.gusts.rotation
-    flown = Predictor(flight, np.repeat(rows[0, :1], 1 + k * len(rows)), rotation=turns)
+    kind = evidence.gusts.kind
+    flown = Predictor(flight, np.repeat(rows[0, :1], 1 + k * len(rows)), kind=kind)
     flown.place(0)
     left = [flown.fly(first, 0, evidence.gain.K)]
     for now, (start, end, own) in zip(rows, _stretches(cut, k), strict=True):
-        off = held(now, flight.dt, turns)
+        off = held(now, flight.dt, kind)
         flown.fleet.parameters[:] = off[0]
         flown.fleet.parameters[own] = off[1:]
         left.append(flown.fly(end - start, start, evidence.gain.K))

@@ -67,7 +67,7 @@ class _EndToEnd:
         to_the_end = [np.minimum(np.arange(len(f.time)), len(g.K) - 1) for f, g in zip(flights, gains, strict=True)]
         K = np.concatenate([g.K[steps] for g, steps in zip(gains, to_the_end, strict=True)])
         self.gain = np.ascontiguousarray(np.swapaxes(K, 1, 2))[None]
-        self.rotation = np.array([g.gusts.rotation for g in gains])
+        self.kinds = np.array([g.gusts.kind for g in gains], float)
         self.starts = [started(f, 0) for f in flights]
 
     def innovations(self, rows: Sequence[NDArray], pushes: Sequence[tuple[Push, ...]]) -> list[FloatArray]:
@@ -76,7 +76,9 @@ class _EndToEnd:
         of = np.repeat(np.arange(len(rows)), counts)
         of = np.concatenate([of, np.repeat(of[-1:], spare(len(of)))])
         everything = end_to_end([*rows, *[rows[-1][-1:]] * (len(of) - int(at[-1]))])
-        fleet = Fleet(held(everything, dt, self.rotation[of]), len(of), dt, substeps(dt))
+        variants = held(everything, dt)
+        variants["turbulence_tail_delay"], variants["turbulence_rotation"] = self.kinds[of].T
+        fleet = Fleet(variants, len(of), dt, substeps(dt))
         put(fleet, {name: np.array([start[name] for start in self.starts])[of] for name in self.starts[0]})
         pushed = [replace(q, row=int(at[i]) + q.row, series=self._placed(i, q.series))
                   for i, some in enumerate(pushes) for q in some]  # fmt: skip

@@ -30,7 +30,7 @@ def as_predicted(flight: Reconstruction, left: FloatArray, gain: Gain) -> Recons
     measured[:, :FED_BACK][blank] = 0.0  # a reading that the gain does not believe
     filled = replace(flight, measured=measured)
     again = innovations(filled, flight.parameters, gain.K * (stretch(flight) / stretch(filled)), (),
-                        gain.gusts.rotation)[:, 0]
+                        gain.gusts.kind)[:, 0]
     throughout = replace(filled, measured=predicted(filled, again))
     return told.filled_as(throughout, [MEASURED[c] for c in np.flatnonzero(blank.any(axis=0))])
 

@@ -28,21 +28,37 @@ from icing_env.turbulence import (
 from sim2real.records.reconstruct import Reconstruction
 
 
-class Gusts(NamedTuple):
-    """Turbulence along a record.
+class Kind(NamedTuple):
+    """How gusts differ along the aircraft.
 
     Attributes:
-        sigma: intensity, m/s.
-        rotation: whether the air turns (the rotational spectra of MIL-F-8785C), and the tail meets no gust later.
+        tail_delay: whether the tail meets the vertical gust later.
+        rotation: whether the air turns (the rotational spectra of MIL-F-8785C, that of pitch only without the delay).
     """
 
-    sigma: float
+    tail_delay: bool = True
     rotation: bool = False
+
+    def put(self, parameters: NDArray) -> None:
+        """Let PARAMETERS rows meet such gusts."""
+        parameters["turbulence_tail_delay"] = float(self.tail_delay)
+        parameters["turbulence_rotation"] = float(self.rotation)
+
+
+LATER = Kind()
+KINDS = (LATER, Kind(False, True), Kind(False, False), Kind(True, True))
+
+
+class Gusts(NamedTuple):
+    """Turbulence along a record: its intensity, m/s, and its kind."""
+
+    sigma: float
+    kind: Kind = LATER
 
     def put(self, parameters: NDArray) -> None:
         """Let PARAMETERS rows meet them."""
         parameters["turbulence_sigma_w"] = max(self.sigma, 1e-6)
-        parameters["turbulence_tail_delay"] = float(not self.rotation)
+        self.kind.put(parameters)
 
     def noise(self, flight: Reconstruction) -> FloatArray:
         """Covariance of what drives them over a step of a record [dryden states, dryden states]."""
@@ -51,12 +67,12 @@ class Gusts(NamedTuple):
 
     def span(self, flight: Reconstruction) -> float:
         """That along which the air turns, m; 0 if it does not."""
-        return float(flight.parameters["span"][0]) if self.rotation else 0.0
+        return float(flight.parameters["span"][0]) if self.kind.rotation else 0.0
 
     def rolling(self, flight: Reconstruction) -> float:
         """Standard deviation of the rolling gust, rad/s."""
         speed, height = _typical(flight)
-        return _rolling(self.sigma, speed, height, self.span(flight))[0] if self.rotation else 0.0
+        return _rolling(self.sigma, speed, height, self.span(flight))[0] if self.kind.rotation else 0.0
 
 
 def _typical(flight: Reconstruction) -> tuple[float, float]:
@@ -110,11 +126,13 @@ def drift_turbulence(s: Any, p: Any, airspeed: float, dt: float) -> None:
     v_before, w_before = transverse(s.dryden_v1, s.dryden_v2), transverse(s.dryden_w1, s.dryden_w2)
     drift_translation(s, v, dt)
     put_translation(s)
-    if p.turbulence_tail_delay != 0.0:
+    if p.turbulence_rotation != 0.0:
+        s.dryden_p *= math.exp(-dt / roll_time(p.span, v))
+        s.gust_p = s.dryden_p
+        follow_path(s, p, v, dt, v_before, w_before)
+    else:
         stay_level(s)
+    if p.turbulence_tail_delay != 0.0:
         reach_tail(s, p, v, before, dt)
-        return
-    s.dryden_p *= math.exp(-dt / roll_time(p.span, v))
-    s.gust_p = s.dryden_p
-    follow_path(s, p, v, dt, v_before, w_before)
-    s.gust_w_tail = s.gust_w
+    else:
+        s.gust_w_tail = s.gust_w

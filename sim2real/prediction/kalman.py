@@ -16,7 +16,7 @@ import numpy as np
 from icing_env.jit import entry
 from icing_env.record import FloatArray
 from sim2real.prediction.correction import ROTATION
-from sim2real.prediction.gusts import Gusts
+from sim2real.prediction.gusts import LATER, Gusts, Kind
 from sim2real.prediction.predictor import TANGENT, Predictor, stretch
 from sim2real.prediction.readings import ALTITUDE, apart, read_share, unread
 from sim2real.records.channels import FED_BACK, MEASURED, NOISE_FLOOR, SURFACES
@@ -74,7 +74,7 @@ class Gain:
         return replace(self, K=np.concatenate([first, self.K[-1:]]))
 
 
-def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),), rotation: bool = False
+def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),), kind: Kind = LATER
               ) -> tuple[FloatArray, FloatArray, FloatArray]:  # fmt: skip
     """A, C of the one-step map about the record's typical state in each span, and B for a step of each of INPUTS.
 
@@ -85,7 +85,7 @@ def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),), r
     size[[i for i, n in enumerate(TANGENT) if n.startswith(("dryden", "gust"))]] = 1e-2
     n, m = len(TANGENT), len(spans)
     each = 2 * n + 2 * len(INPUTS) + 1
-    flown = Predictor(flight, flight.parameters, m * each, rotation)
+    flown = Predictor(flight, flight.parameters, m * each, kind)
     flown.place_in(spans, each)
     change = np.zeros((each, n))
     change[:n], change[n : 2 * n] = np.diag(size), -np.diag(size)
@@ -104,15 +104,15 @@ def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),), r
     return A, C, B
 
 
-def gains(flight: Reconstruction, sigmas: Sequence[float], rotation: bool = False) -> list[Gain]:
-    """Steady gain and innovation covariance for each gust intensity; `rotation`: of air that turns."""
-    A, C, B = (matrix[0] for matrix in linearise(flight, rotation=rotation))
+def gains(flight: Reconstruction, sigmas: Sequence[float], kind: Kind = LATER) -> list[Gain]:
+    """Steady gain and innovation covariance for each gust intensity."""
+    A, C, B = (matrix[0] for matrix in linearise(flight, kind=kind))
     C, out, every = C[:FED_BACK], list[Gain](), apart(flight)
     seen = flight.noise[:FED_BACK] ** 2
     # far apart, samples differ by gusts most of all: what is left of that says little, and too much harms less
     least = np.where(np.array(every) > 1, SURE * seen, 0.0)
     for sigma in sigmas:
-        gusts = Gusts(sigma, rotation)
+        gusts = Gusts(sigma, kind)
         Qw = gusts.noise(flight)
         noise = np.maximum(seen - roughness(A, C, A[:, DRYDEN], C[:, DRYDEN], Qw, every), least)
         model = _noisy(flight, A, C, B, gusts, Qw, noise, read_share(flight))
@@ -137,7 +137,7 @@ def follow(flight: Reconstruction, gain: Gain) -> Gain:
     noise = np.diag(gain.model[3] - D @ Qw @ D.T) * np.maximum(share, 1e-3)
     share = np.where(steadily, share, share > 0.0)
     K, S = [], []
-    linear = flight.once(f"linear along {gain.gusts.rotation}", lambda: linearise(flight, spans, gain.gusts.rotation))
+    linear = flight.once(f"linear along {gain.gusts.kind}", lambda: linearise(flight, spans, gain.gusts.kind))
     for span, A, C, B in zip(spans, *linear, strict=True):
         model = _noisy(flight, A, C[:FED_BACK], B, gain.gusts, Qw, noise, share)
         here, covariance, P = _recursion(*model, P, lost[span.start : span.start + each])
@@ -163,17 +163,17 @@ def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, 
     least = np.array([NOISE_FLOOR[name] for name in MEASURED[:FED_BACK]])
     G, D = A[:, DRYDEN], C[:, DRYDEN]
     driven = np.concatenate([flight.surface_noise, flight.power_noise])
-    Q = G @ Qw @ G.T + np.diag(walk**2 * flight.dt) + (B * driven**2) @ B.T + _within_steps(A, Qw, gusts.span(flight))
+    Q = G @ Qw @ G.T + np.diag(walk**2 * flight.dt) + (B * driven**2) @ B.T + _within_steps(A, Qw, gusts, flight)
     R = np.diag(np.where(read == 0.0, ABSENT, np.maximum(noise, least**2) / np.maximum(read, 1e-3)))
     return A, C, Q, D @ Qw @ D.T + R, G @ Qw @ D.T
 
 
-def _within_steps(A: FloatArray, Qw: FloatArray, span: float = 0.0) -> FloatArray:
+def _within_steps(A: FloatArray, Qw: FloatArray, gusts: Gusts, flight: Reconstruction) -> FloatArray:
     """Covariance of the states' noise from how gusts leave the straight lines between samples that the model has.
 
     White noise drives them: about its line such a gust is a Brownian bridge, whose mean over the step has a twelfth of
     the variance that the step adds. The tail's delay (a Pade form) passes what is quick with its sign turned, and twice
-    that mean a little later. Air that turns along a span (m) does so by what is quick in v and w.
+    that mean a little later. Air that turns does so by what is quick in v and w.
     """
     u, v, w, tail, p, q, r = (TANGENT.index(f"gust_{n}") for n in ("u", "v", "w", "w_tail", "p", "q", "r"))
     moved = [*(TANGENT.index(n) for n in ("u", "v", "w", "p", "q", "r")), tail]
@@ -182,12 +182,13 @@ def _within_steps(A: FloatArray, Qw: FloatArray, span: float = 0.0) -> FloatArra
     shape[1, 1:3] = shape[2, 3:5] = np.sqrt(1.5), (1.0 - np.sqrt(3.0)) / np.sqrt(2.0)
     of_tail = 2.0 * A[moved, tail] / (1.0 + A[tail, tail])  # of a gust there that lasts the step
     of_wing = 2.0 * A[moved, w] - A[tail, w] * of_tail
-    by_w, by_v = of_wing - of_tail, 2.0 * A[moved, v]
-    if span > 0.0:  # the tail meets the gust at once
-        by_w = of_wing + of_tail - 2.0 * A[moved, q] * np.pi / (4.0 * span)
+    later = gusts.kind.tail_delay
+    by_w, by_v = of_wing + (-of_tail if later else of_tail), 2.0 * A[moved, v]
+    if span := gusts.span(flight):
+        by_w = by_w - 2.0 * A[moved, q] * np.pi / (4.0 * span) * (not later)
         by_v = by_v + 2.0 * A[moved, r] * np.pi / (3.0 * span)
     mean = np.column_stack([2.0 * A[moved, u], by_v, by_w, 2.0 * A[moved, p]])
-    mean[-1] = 0.0, 0.0, 0.0 if span > 0.0 else 2.0 * (1.0 - A[tail, tail]), 0.0
+    mean[-1] = 0.0, 0.0, 2.0 * (1.0 - A[tail, tail]) if later else 0.0, 0.0
     out = np.zeros_like(A)
     out[np.ix_(moved, moved)] = mean * np.diag(shape @ Qw @ shape.T) @ mean.T / 12.0
     return out

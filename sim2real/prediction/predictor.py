@@ -25,6 +25,7 @@ from icing_env.simulate import Fleet
 from icing_env.types import STATE
 from sim2real.prediction.along import CONTROLS, SLOW_SURFACE, STILL, along, read
 from sim2real.prediction.correction import STATES, X, columns, turn
+from sim2real.prediction.gusts import LATER, Kind
 from sim2real.records.channels import FED_BACK, MEASURED, SURFACES
 from sim2real.records.instruments import STEP
 from sim2real.records.reconstruct import Reconstruction
@@ -59,13 +60,13 @@ class Push:
 class Predictor:
     """A fleet of variants flown along one record: a PARAMETERS row each, or one row for `n` of them.
 
-    `rotation`: whether gusts turn the air (`Gusts`).
+    `kind`: of the gusts.
     """
 
-    def __init__(self, flight: Reconstruction, parameters: NDArray, n: int | None = None, rotation: bool = False
+    def __init__(self, flight: Reconstruction, parameters: NDArray, n: int | None = None, kind: Kind = LATER
                  ) -> None:  # fmt: skip
         self.flight, self.n = flight, len(parameters) if n is None else n
-        self.fleet = Fleet(held(parameters, flight.dt, rotation), self.n, flight.dt, substeps(flight.dt))
+        self.fleet = Fleet(held(parameters, flight.dt, kind), self.n, flight.dt, substeps(flight.dt))
         self.x = self.fleet.state.view(np.float64).reshape(self.n, -1)
 
     def place(self, k: int) -> None:
@@ -168,11 +169,8 @@ def _listed(items: list[tuple[int, int, FloatArray]]) -> Listed:
     return at, np.array([item[2] for item in items], np.float64) if items else np.zeros((0, 0))
 
 
-def held(parameters: NDArray, dt: float, rotation: bool | NDArray[np.bool_] = False) -> NDArray:
-    """PARAMETERS for a plant whose surfaces and powers follow a record: no noise, no limits, gusts as states.
-
-    `rotation`: whether these turn the air, of all rows or each.
-    """
+def held(parameters: NDArray, dt: float, kind: Kind = LATER) -> NDArray:
+    """PARAMETERS for a plant whose surfaces and powers follow a record: no noise, no limits, gusts as states."""
     out = copied(parameters)
     for name in NOISES:
         out[name] = 0.0
@@ -184,7 +182,8 @@ def held(parameters: NDArray, dt: float, rotation: bool | NDArray[np.bool_] = Fa
             out[name] = 0.0
     out["hinge_elevator_hold"] = out["hinge_aileron_hold"] = 1e12
     out["spool_time"] = 1e12
-    out["turbulence_sigma_w"], out["turbulence_tail_delay"] = 0.1 * STILL, 1.0 - np.asarray(rotation, np.float64)
+    out["turbulence_sigma_w"] = 0.1 * STILL
+    kind.put(out)
     return out
 
 
@@ -231,7 +230,7 @@ def put(fleet: Fleet, values: Mapping[str, float | FloatArray]) -> None:
 
 
 def innovations(flight: Reconstruction, parameters: NDArray, gain: FloatArray, pushes: tuple[Push, ...] = (),
-                rotation: bool = False) -> FloatArray:
+                kind: Kind = LATER) -> FloatArray:
     """Measured less predicted of every row [N-1, n, channels]; nan where nothing was measured.
 
     Args:
@@ -239,17 +238,17 @@ def innovations(flight: Reconstruction, parameters: NDArray, gain: FloatArray, p
         parameters: a PARAMETERS row per variant.
         gain: K of a `Gain` [steps, states, fed-back channels], or one per row [n, ...]; the last step's goes on.
         pushes: generic discrepancies.
-        rotation: whether the gusts of the gain turn the air.
+        kind: of the gain's gusts.
     """
-    return with_spare(flight, parameters, gain, pushes, rotation)[:, : len(parameters)]
+    return with_spare(flight, parameters, gain, pushes, kind)[:, : len(parameters)]
 
 
 def with_spare(flight: Reconstruction, parameters: NDArray, gain: FloatArray, pushes: tuple[Push, ...] = (),
-               rotation: bool = False) -> FloatArray:
+               kind: Kind = LATER) -> FloatArray:
     """The same, more rows behind those asked for where two or three beside full lanes would take longer than four."""
     count = len(parameters)
     rows = np.take(parameters, [*range(count), *[count - 1] * (spare(count) * (gain.ndim == 3))])
-    flown = Predictor(flight, rows, rotation=rotation)
+    flown = Predictor(flight, rows, kind=kind)
     flown.place(0)
     return lost(flown.fly(len(flight.time) - 1, gain=gain, pushes=pushes), np.isfinite(flight.measured[1:]))
 

@@ -63,9 +63,8 @@ class Evidence:
 
 
 def typical(evidences: Sequence[Evidence]) -> Gusts:
-    """Gusts as they are along most of some records."""
-    along = [e.gusts for e in evidences]
-    return Gusts(float(np.mean([g.sigma for g in along])), 2 * sum(g.rotation for g in along) > len(along))
+    """Gusts of some records' mean intensity; they are of one kind."""
+    return Gusts(float(np.mean([e.gusts.sigma for e in evidences])), evidences[0].gusts.kind)
 
 
 def gather(flight: Reconstruction, bank: Bank, gain: Gain | None = None) -> Evidence:
@@ -76,7 +75,7 @@ def gather(flight: Reconstruction, bank: Bank, gain: Gain | None = None) -> Evid
     """
     if gain is None:
         gain = follow(flight, choose_gain(flight, SIGMAS))
-    base = innovations(flight, flight.parameters, gain.K, (), gain.gusts.rotation)[:, 0]
+    base = innovations(flight, flight.parameters, gain.K, (), gain.gusts.kind)[:, 0]
     factor = whitening(base, gain, flight)
     about = Filter(as_predicted(flight, base, gain), gain, factor, round(SETTLE / flight.dt))
     known = about.respond(pushes(about.flight, bank.terms))
@@ -102,7 +101,7 @@ def flown(flight: Reconstruction, rows: NDArray, pushed: tuple[Push, ...], gain:
           keep: Sequence[int] = (), linear: Responses = NONE) -> Evidence:
     """The same but for the paths, which do not care how the aircraft flies."""
     moved, renamed = to_fly(flight, rows, pushed)
-    left = with_spare(flight, np.take(rows, moved), gain.K, renamed, gain.gusts.rotation)
+    left = with_spare(flight, np.take(rows, moved), gain.K, renamed, gain.gusts.kind)
     return told(flight, left, moved, len(rows), gain, factor, keep, linear)
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from icing_env.record import FloatArray
+from sim2real.prediction.gusts import KINDS, LATER, Kind
 from sim2real.prediction.kalman import Gain, follow, gains
 from sim2real.prediction.predictor import LOST, Push, innovations
 from sim2real.prediction.readings import slow
@@ -19,12 +20,14 @@ from sim2real.signatures.whitening import SETTLE, factors, whiten
 # m/s
 SIGMAS = (0.003, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.55, 0.67, 0.82, 1.0, 1.2, 1.45, 1.75, 2.1, 2.6,
           3.2)  # fmt: skip
-PLAIN, STILL = 1.0, 0.3  # of log likelihood a sample, the least that speaks for air that turns, and to leave it at that
-TURNING, MOST = 8.0, 1.5  # of the same per (m/s)^2, half of what it is; m/s
+CALM = 0.1  # m/s, below which no kind of gusts is told
+# Of log likelihood a sample: the least that speaks for air that turns, or that meets all of the aircraft at once, and
+# half of what it is per (m/s)^2 (our simulator at 0.25 to 1.5 m/s: 15 to 25, and 2 to 3); m/s beyond which no more
+TURNING, AT_ONCE, MOST = (0.3, 8.0), (0.05, 1.0), 1.5
 TOGETHER = 100  # samples that the channels have to share for their covariance to be judged
 
 
-def choose_gain(flight: Reconstruction, sigmas: Sequence[float], pushed: Sequence[Push] = (), rotation: bool = False
+def choose_gain(flight: Reconstruction, sigmas: Sequence[float], pushed: Sequence[Push] = (), kind: Kind = LATER
                 ) -> Gain:  # fmt: skip
     """The gust intensity that makes the model's innovations likeliest, between those given by a parabola.
 
@@ -35,59 +38,88 @@ def choose_gain(flight: Reconstruction, sigmas: Sequence[float], pushed: Sequenc
     Args:
         sigmas: intensities, ascending.
         pushed: generic discrepancies that the model is flown with, whatever their rows.
-        rotation: whether the air turns.
+        kind: of the gusts.
     """
-    options = gains(flight, sigmas, rotation)
+    options = gains(flight, sigmas, kind)
     scores = likelihoods(flight, options, pushed)
     k = int(np.argmax(scores))
     if k in (0, len(options) - 1):
         return options[k]
-    return gains(flight, (_peak(sigmas[k - 1 : k + 2], scores[k - 1 : k + 2]),), rotation)[0]
+    return gains(flight, (_peak(sigmas[k - 1 : k + 2], scores[k - 1 : k + 2]),), kind)[0]
 
 
-def air_turns(flights: Sequence[Reconstruction], found: Sequence[Gain], pushed: Sequence[Sequence[Push]]) -> bool:
-    """Whether the air of some records turns, by how likely they are with the gusts found and with the other kind.
+def kind_at_first(flights: Sequence[Reconstruction]) -> Kind:
+    """The same before anything is known, with the model as it was published.
 
-    The air of a day is of one kind. What a gap makes of roll and yaw passes for air that turns, so that this is for a
-    model with an explanation in it, and the log likelihood of a sample has to gain half of what air that turns so much
-    makes of it (15 to 25 per (m/s)^2); no more than of MOST, since what is not understood passes for stronger gusts
-    than there are.
-    Of an aircraft that the model is known to follow poorly, or of which only the strongest gusts make sense, nothing is
-    said: what the model lacks passes for air that turns, too.
+    Gusts of another kind leave more than derivatives that are off by their spread; and taken for strong gusts of this
+    kind, the model settles where no other kind makes sense any more.
+    """
+    told = [flight for flight in flights if flight.inadequacy.walk <= 1.0]
+    return KINDS[int(np.argmax(np.sum(each(_at_first, told), axis=0)))] if told else LATER
+
+
+def _at_first(flight: Reconstruction) -> list[float]:
+    """Log likelihood of a sample by kind of gusts beyond that of LATER, less what is asked; else as `_in_favour`."""
+    out = list[float]()
+    for kind in KINDS:
+        options = gains(flight, SIGMAS[::2], kind)
+        scores = likelihoods(flight, options)
+        best = options[int(np.argmax(scores))]
+        if kind == LATER and best.sigma < CALM:
+            return [0.0] * len(KINDS)
+        score = max(scores) - _asked(best)
+        out.append(min(score, out[0]) if out and best is options[-1] else score)
+    return [score - out[0] for score in out]
+
+
+def kind_of_gusts(flights: Sequence[Reconstruction], found: Sequence[Gain], pushed: Sequence[Sequence[Push]]) -> Kind:
+    """The likeliest kind of gusts along some records, which were flown on one day and met gusts of one kind.
+
+    What a gap makes of roll and yaw passes for air that turns, and what it makes of pitch for a tail that meets gusts
+    later or not, so that this is for a model with an explanation in it, and the log likelihood has to gain half of what
+    gusts of another kind than LATER, as strong as they are found, make of it.
+    Of an aircraft that the model is known to follow poorly nothing is said: what the model lacks passes for a kind of
+    gusts, too.
 
     Args:
         found: gains of each record, of gusts of one kind.
         pushed: generic discrepancies that the model is flown with, of each record.
     """
-    turned = found[0].gusts.rotation
-    told = [of for of in zip(flights, found, pushed, strict=True)
-            if of[0].inadequacy.walk <= 1.0 and not (turned and of[1].sigma == SIGMAS[-1])]
-    if not told:
-        return False
-    gained = each(_gained, *zip(*told, strict=True))
-    if turned:
-        return -sum(gained) > sum(max(STILL, 0.5 * _asked(gain)) for _, gain, _ in told)
-    if max(gained) <= PLAIN:
-        return False
-    turning = each(lambda flight, _, push: choose_gain(flight, SIGMAS, push, True), *zip(*told, strict=True))
-    likely = [(*of, gain) for of, gain in zip(told, turning, strict=True) if gain.sigma != SIGMAS[-1]]
-    return sum(_gained_by(*of) for of in likely) > sum(_asked(of[-1]) for of in likely)
+    told = [of for of in zip(flights, found, pushed, strict=True) if of[0].inadequacy.walk <= 1.0]
+    return KINDS[int(np.argmax(np.sum(each(_in_favour, *zip(*told, strict=True)), axis=0)))] if told else LATER
 
 
-def _asked(turning: Gain) -> float:
-    """What the log likelihood of a sample gains at least where the air turns as a gain expects it to."""
-    return TURNING * min(turning.sigma, MOST) ** 2
+def _in_favour(flight: Reconstruction, found: Gain, pushed: Sequence[Push]) -> list[float]:
+    """Log likelihood of a sample by kind of gusts: beyond that with the gusts found, and less what is asked.
+
+    Where only the strongest gusts make sense, what is not understood passes for gusts: nothing is in their favour.
+    """
+    if found.sigma < CALM:
+        return [0.0] * len(KINDS)
+    here = likelihoods(flight, [found], pushed)[0]
+
+    def gained(gain: Gain) -> float:
+        return float(np.nan_to_num(likelihoods(flight, [gain], pushed)[0] - here, nan=-np.inf))
+
+    out = []
+    for kind in KINDS:
+        if kind == found.gusts.kind:
+            out.append(-0.5 * _asked(found))
+            continue
+        gain = gains(flight, (found.sigma,), kind)[0]
+        if (gain_of := gained(gain)) > 0.0:
+            gain = choose_gain(flight, SIGMAS, pushed, kind)
+            gain_of = gained(gain)
+        out.append(min(gain_of, 0.0) if gain.sigma == SIGMAS[-1] and kind != LATER else gain_of - _asked(gain))
+    return out
 
 
-def _gained(flight: Reconstruction, found: Gain, pushed: Sequence[Push]) -> float:
-    """What the log likelihood of a sample gains by gusts as strong and of the other kind."""
-    return _gained_by(flight, found, pushed, gains(flight, (found.sigma,), not found.gusts.rotation)[0])
-
-
-def _gained_by(flight: Reconstruction, found: Gain, pushed: Sequence[Push], other: Gain) -> float:
-    """The same by another gain."""
-    here, there = (likelihoods(flight, [gain], pushed)[0] for gain in (found, other))
-    return there - here
+def _asked(gain: Gain) -> float:
+    """What the log likelihood of a sample has to gain by gusts of such a kind, half of it to stay with them."""
+    if gain.gusts.kind == LATER:
+        return 0.0
+    least, by = TURNING if gain.gusts.kind.rotation else AT_ONCE
+    return max(least, by * min(gain.sigma, MOST) ** 2)
 
 
 def likelihoods(flight: Reconstruction, options: Sequence[Gain], pushed: Sequence[Push] = ()) -> list[float]:
@@ -97,11 +129,11 @@ def likelihoods(flight: Reconstruction, options: Sequence[Gain], pushed: Sequenc
     Where a channel is slow, gains at every step are too far from those that it needs: gusts are judged by these.
     All of them are of gusts of one kind.
     """
-    rotation = options[0].gusts.rotation
+    kind = options[0].gusts.kind
     options = [follow(flight, gain) for gain in options] if slow(flight) else options
     everywhere = tuple(replace(push, row=i) for push in pushed for i in range(len(options)))
     left = innovations(flight, np.repeat(flight.parameters, len(options)), np.stack([g.K for g in options]), everywhere,
-                       rotation)
+                       kind)
     left = left[round(SETTLE / flight.dt) :]
     seen = np.isfinite(left[:, 0, : FED_BACK - 1])
     use = np.flatnonzero(seen.sum(axis=0) > 0.5 * seen.sum(axis=0).max())

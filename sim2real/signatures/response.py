@@ -77,10 +77,10 @@ class Filter:
         dt, steps = self.flight.dt, len(self.flight.time) - 1
         each = max(round(SPAN / dt), 1)
         spans = [slice(k, min(k + each, steps + 1)) for k in range(0, steps, each)]
-        rotation = self.gain.gusts.rotation
-        found = [linearise(self.flight, spans[k : k + AT_ONCE], rotation)[:2] for k in range(0, len(spans), AT_ONCE)]
+        kind = self.gain.gusts.kind
+        found = [linearise(self.flight, spans[k : k + AT_ONCE], kind)[:2] for k in range(0, len(spans), AT_ONCE)]
         A, C = (np.concatenate(matrices) for matrices in zip(*found, strict=True))
-        moves = np.array([rotation or name not in ROTATION for name in TANGENT])
+        moves = np.array([kind.rotation or name not in ROTATION for name in TANGENT])
         K = np.ascontiguousarray(self.gain.K[:, moves])
         return A[:, moves][:, :, moves], C[:, :, moves], K, each, np.cumsum(moves) - 1
 

@@ -14,7 +14,8 @@ from testbed.benchmarks.failures import rows as failed_rows
 from testbed.benchmarks.ledger import enter, enter_draw
 from testbed.benchmarks.published_sets import publish
 from testbed.rivals import RIVALS
-from testbed.withheld.draw import DEVELOPMENT_SEED, SPREAD
+from testbed.withheld.draw import DEVELOPMENT_SEED, USUAL
+from testbed.withheld.draw import Population as Population
 from testbed.withheld.files import read_json, tampered, write_text
 from testbed.withheld.generate import generate
 from testbed.withheld.manoeuvres import DIAGNOSED
@@ -28,7 +29,7 @@ QUICK, FULL, STRANGERS = 150, 2400, 40
 @a_core_each()
 def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Progress,
             without: bool = False, rivals: bool = False, ledger: Path | None = None,
-            published: Path | None = None, strangers: bool = False, spread: float = SPREAD) -> dict[str, Any]:
+            published: Path | None = None, population: Population = USUAL) -> dict[str, Any]:
     """Draw (or finish drawing) a set in `out`, diagnose every case, fly the answers again, score.
 
     Args:
@@ -41,13 +42,12 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
         rivals: let every rival (`testbed.rivals`) answer too, into `answers_NAME`; what stands there is scored anyway.
         ledger: file that is told, by a line each, of the set once it is drawn and of its figures.
         published: file that the set is published in once it is scored (`published_sets`).
-        strangers: draw effects of the second list of unknown ones alone (`testbed.withheld.strangers`).
-        spread: of the aircraft's derivatives about the published ones.
+        population: what is drawn.
 
     Raises:
         InputError: `out` holds another set, or its files are not those of its manifest.
     """
-    committed = drawn(out, cases, seed, workers, progress, strangers, spread)
+    committed = drawn(out, cases, seed, workers, progress, population)
     if ledger is not None:
         enter_draw(ledger, kind_of(committed), committed, out)
     names = sorted(committed["cases"])
@@ -73,7 +73,7 @@ def measure(out: Path, cases: int, seed: int | None, workers: int, progress: Pro
 
 
 def drawn(out: Path, cases: int, seed: int | None, workers: int, progress: Progress,
-          strangers: bool = False, spread: float = SPREAD) -> dict[str, Any]:
+          population: Population = USUAL) -> dict[str, Any]:
     """Draw a set in `out`, or finish it; its manifest, and `sources`, the hash of what will answer it.
 
     Raises:
@@ -86,15 +86,14 @@ def drawn(out: Path, cases: int, seed: int | None, workers: int, progress: Progr
     if (out / "manifest.json").is_file():
         committed = read_json(out / "manifest.json")
         wanted = None if seed is None else DEVELOPMENT_SEED + seed
-        there = (committed["count"], committed["development_seed"], "strangers" in committed,
-                 committed.get("spread", SPREAD))  # fmt: skip
-        if there != (cases, wanted, strangers, spread):
+        there = (committed["count"], committed["development_seed"], Population.of(committed))
+        if there != (cases, wanted, population):
             raise InputError(f"{out}: holds a {kind_of(committed)} set of {committed['count']} cases, "
                              "not the one asked for; give another --out")
     else:
         try:
             committed = generate(out, cases, None if seed is None else DEVELOPMENT_SEED + seed, workers, progress,
-                                 strangers, spread)
+                                 population)
         except ValueError as error:
             raise InputError(f"{error}; give another --out") from error
     untouched(out, committed)
@@ -117,7 +116,8 @@ def kind_of(committed: Mapping[str, Any]) -> str:
     """What kind of set a manifest is of: its seed the operating system's, or one that is known; and what it draws."""
     seed = "sealed" if committed["development_seed"] is None else "development"
     spread = f" spread {committed['spread']:g}" if "spread" in committed else ""
-    return seed + spread + (" strangers" if "strangers" in committed else "")
+    gusts = f" gusts {committed['gusts']}" if "gusts" in committed else ""
+    return seed + spread + gusts + (" strangers" if "strangers" in committed else "")
 
 
 def removals(keys: Path) -> dict[str, str]:

@@ -17,6 +17,7 @@ from testbed.commands.common import print_json, print_table, verb
 
 NAMES = ("speed", "characterisation", "protection", "adaptation", "diagnosis", "real_flight",
          "policies", "recordings")
+GUSTS = ("later", "turning", "at_once", "rolling", "mixed")
 EXAMPLE = """icing benchmark speed --json
 icing benchmark characterisation --quick --figure out/reliability.png
 icing benchmark protection --encounters 200 --json
@@ -52,12 +53,14 @@ icing benchmark diagnosis --jsbsim"""
 @click.option("--strangers", is_flag=True, help="diagnosis: only effects that nobody had in mind; 40 if not told.")
 @click.option("--spread", type=click.FloatRange(min=0.0, max=0.3), default=0.05, show_default=True,
               help="diagnosis: of the aircraft's derivatives about the published ones, one standard deviation.")
+@click.option("--gusts", type=click.Choice(GUSTS), default="later", show_default=True,
+              help="diagnosis: how they differ along the aircraft; mixed: each kind in turn.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True,
               help="diagnosis, recordings: processes.")
 def command(name: str, quick: bool, weights: Path | None, figure: Path | None, encounters: int | None,
             only: str | None, cases: int | None, fresh_seed: bool, out: Path, ledger: Path | None, workers: int,
-            without: bool, rivals: bool, strangers: bool, spread: float, pool: tuple[Path, ...], publish: Path | None,
-            jsbsim: bool, jsbsim_root: str | None, as_json: bool, seed: int) -> None:
+            without: bool, rivals: bool, strangers: bool, spread: float, gusts: str, pool: tuple[Path, ...],
+            publish: Path | None, jsbsim: bool, jsbsim_root: str | None, as_json: bool, seed: int) -> None:
     """Measure the testbed.
 
     `speed`: one aircraft and batches, with and without observer, one thread, beside JSBSim in the same run (if it is
@@ -93,11 +96,11 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
         _pooled(pool, as_json)
         return
     if name == "diagnosis":
-        from testbed.benchmarks.diagnosis import FULL, QUICK, STRANGERS
+        from testbed.benchmarks.diagnosis import FULL, QUICK, STRANGERS, Population
 
         _diagnosis(cases or (STRANGERS if strangers else QUICK if quick else FULL), None if fresh_seed else seed,
                    out / "strangers" if strangers else out, workers, as_json, without=without, rivals=rivals,
-                   ledger=ledger, published=publish, strangers=strangers, spread=spread)
+                   ledger=ledger, published=publish, population=Population(strangers, spread, gusts))
         return
     if name in ("real_flight", "policies"):
         _cases(name, only, as_json)

@@ -13,6 +13,7 @@ from icing_env.record import FloatArray
 from sim2real.actuators.paths import driven
 from sim2real.closing import gap
 from sim2real.diagnosis import Diagnosis
+from sim2real.prediction.gusts import KINDS
 from sim2real.prediction.windows import COMPARED, cut, residuals
 from sim2real.records.channels import TOLERANCE
 from sim2real.where import stretches
@@ -24,6 +25,8 @@ from testbed.reports.plot_style import scale_of
 from testbed.reports.plotting import gap_bars, time_histories
 from testbed.reports.surface_answers import answer, by_surface, suspected
 
+GUSTS = dict(zip(KINDS, ("", " (rotational, after MIL-F-8785C)", " (met by all of the aircraft at once)",
+                         " (met by the tail later, rolling and yawing ones too)"), strict=True))  # fmt: skip
 KIND = {"no_gap": "good", "explained": "caution", "unknown": "bad"}
 OVERLAID = ("airspeed", "alpha", "q", "theta", "ax", "az", "beta", "p", "r", "phi", "ay")
 
@@ -59,8 +62,7 @@ def _of_what(found: Diagnosis) -> str:
     seconds = sum(len(f.time) * f.dt for f in flights)
     gusts = sorted({round(e.gusts.sigma, 2) for e in found.details.evidences})
     told = f"{gusts[0]:g} m/s" if len(gusts) == 1 else f"{gusts[0]:g} to {gusts[-1]:g} m/s"
-    rotational = sum(e.gusts.rotation for e in found.details.evidences)
-    kind = f" (rotational, after MIL-F-8785C, in {rotational} of {len(flights)})" if rotational else ""
+    kind = GUSTS[found.details.evidences[0].gusts.kind]
     more = f", {len(held_out)} held out" if held_out else ""
     return f"{len(flights)} record{'s' * (len(flights) != 1)} of {seconds:.0f} s in all, gusts of {told}{kind}{more}"
 

@@ -18,6 +18,7 @@ from scipy.linalg import solve_continuous_lyapunov, solve_discrete_are
 from testbed.withheld import gusts, instruments, trim
 from testbed.withheld import plant as pl
 from testbed.withheld.compiled import compiled
+from testbed.withheld.conditions import Conditions
 from testbed.withheld.flights import Flown
 from testbed.withheld.published import PUBLISHED, airframe
 
@@ -48,17 +49,17 @@ def linear(speed: float) -> tuple[NDArray, NDArray]:
     """Jacobians about level flight at `speed`: of the rates of X and of the outputs SEEN.
 
     Returns:
-        A [10, 19] and C [6, 19]; columns: X, INPUTS, gusts u v w and w at the tail.
+        A [10, 22] and C [6, 22]; columns: X, INPUTS, gusts.
     """
     row = airframe()
     y, u = trim.trimmed(row, speed)
     d, o = np.empty(pl.STATES), np.empty(pl.OUTPUTS)
     columns: list[NDArray] = []
-    steps = [*zip(X, X_STEP, strict=True), *zip(INPUTS, U_STEP, strict=True), *((-1 - j, 0.1) for j in range(4))]
+    steps = [*zip(X, X_STEP, strict=True), *zip(INPUTS, U_STEP, strict=True), *((-1 - j, 0.1) for j in range(pl.GUSTS))]
     for index, step in steps:
         ends = []
         for sign in (1.0, -1.0):
-            z, g = y.copy(), np.zeros(4)
+            z, g = y.copy(), np.zeros(pl.GUSTS)
             if index >= 0:
                 z[index] += sign * step
             else:
@@ -70,21 +71,15 @@ def linear(speed: float) -> tuple[NDArray, NDArray]:
     return J[:10], J[10:]
 
 
-def whitener(speed: float, sigma: float, scale: float, level: float) -> Whitener:
-    """The filter at one speed, gust and noise level."""
+def whitener(speed: float, given: Conditions) -> Whitener:
+    """The filter at one speed in given gusts and noise."""
     A_all, C_all = linear(speed)
     A, B, G = A_all[:, :10], A_all[:, 10:15], A_all[:, 15:]
-    Ag, Bg, Cg = gusts.continuous(max(sigma, CALM), scale, speed)
-    half = 0.5 * PUBLISHED["tail_arm"] / speed
-    # states: X (10), gust (5), the tail's delay (1); w at the tail = 2 z - w
-    to_gust = np.vstack([Cg, -Cg[2]])
-    n = 16
-    Ac, Bc = np.zeros((n, n)), np.zeros((n, 5))
-    Ac[:10, :10], Ac[:10, 10:15], Ac[:10, 15] = A, G @ to_gust, 2.0 * G[:, 3]
-    Ac[10:15, 10:15], Ac[15, 10:15], Ac[15, 15] = Ag, Cg[2] / half, -1.0 / half
-    Bc[:10] = B
-    noise = np.zeros((n, 3))
-    noise[10:15] = Bg
+    Ag, Bg, Cg = gusts.along(given.gusts, max(given.sigma, CALM), given.scale, speed)
+    n = 10 + len(Ag)
+    Ac, Bc, noise = np.zeros((n, n)), np.zeros((n, 5)), np.zeros((n, Bg.shape[1]))
+    Ac[:10, :10], Ac[:10, 10:], Ac[10:, 10:] = A, G @ Cg, Ag
+    Bc[:10], noise[10:] = B, Bg
     Fx, Qx = gusts.discrete(Ac, noise, pl.DT)
     wide = np.zeros((n + 5, n + 5))
     wide[:n, :n], wide[:n, n:] = Ac, Bc
@@ -93,14 +88,13 @@ def whitener(speed: float, sigma: float, scale: float, level: float) -> Whitener
     rows = {0: 0, 1: 1, 2: 2, 6: 3, 7: 4, 8: 5}
     for out, seen in rows.items():
         Cy[out, :10] = C_all[seen, :10]
-        Cy[out, 10:15] = C_all[seen, 15:] @ to_gust
-        Cy[out, 15] = 2.0 * C_all[seen, 18]
+        Cy[out, 10:] = C_all[seen, 15:] @ Cg
         Dy[out] = C_all[seen, 10:15]
     for out, column in ((3, 6), (4, 7), (5, 8)):
         Cy[out, column] = 1.0
-    stationary = np.zeros((6, 6))  # of the gust and of the tail's delay, which nobody knows at the start either
-    stationary[:] = solve_continuous_lyapunov(Ac[10:, 10:], -noise[10:] @ noise[10:].T)
-    return _assembled(Fx, Qx, gamma, Cy, Dy, level, np.linalg.cholesky(stationary + 1e-12 * np.eye(6)))
+    stationary = solve_continuous_lyapunov(Ag, -Bg @ Bg.T)  # of the gust, which nobody knows at the start either
+    start = np.linalg.cholesky(stationary + 1e-12 * np.eye(n - 10))
+    return _assembled(Fx, Qx, gamma, Cy, Dy, given.level, start)
 
 
 def _sensors() -> tuple[NDArray, NDArray]:
@@ -121,13 +115,13 @@ def _assembled(Fx: NDArray, Qx: NDArray, gamma: NDArray, Cy: NDArray, Dy: NDArra
                gust: NDArray) -> Whitener:
     S, E = _sensors()
     C9, D9 = Cy[:9], Dy[:9]
-    n, total = 16, 27
+    n, total = len(Fx), len(Fx) + 11
     F, spread = np.zeros((total, total)), np.zeros((total, n))
     F[:n, :n], F[n:, :n], F[n:, n:] = Fx, E @ C9 @ Fx, S
     spread[:n], spread[n:] = np.eye(n), E @ C9
     M = np.zeros((len(MOTION), total))
-    order = {"airspeed": 16, "alpha": 19, "beta": 20, "p": 21, "q": 22, "r": 23, "phi": 4, "theta": 5, "ax": 24,
-             "ay": 25, "az": 26, "altitude": 0}  # fmt: skip
+    order = {"airspeed": n, "alpha": n + 3, "beta": n + 4, "p": n + 5, "q": n + 6, "r": n + 7, "phi": 4, "theta": 5,
+             "ax": n + 8, "ay": n + 9, "az": n + 10, "altitude": 0}  # fmt: skip
     for i, name in enumerate(MOTION):
         M[i, order[name]] = 1.0
     sizes = instruments.noise_sizes()

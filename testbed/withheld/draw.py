@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from testbed.withheld.conditions import KINDS, Conditions
 from testbed.withheld.effects import EFFECTS, Effect
 from testbed.withheld.manoeuvres import PLANS
 from testbed.withheld.published import DERIVATIVES
@@ -54,15 +57,49 @@ class Design:
     seed: int
     target: float = 0.0  # distance to the nearest pair of library effects that an unknown effect is scaled to
     fault: Fault | None = None
+    gusts: str = "later"
 
     @property
-    def air(self) -> tuple[float, float, float]:
-        """Gust intensity, gust scale and noise level."""
-        return self.sigma, self.scale, self.level
+    def conditions(self) -> Conditions:
+        """Its gusts and noise."""
+        return Conditions(self.sigma, self.scale, self.level, self.gusts)
 
     def random(self, flight: int) -> np.random.Generator:
         """What draws gust and noise of one of its flights."""
         return np.random.default_rng(np.random.SeedSequence([self.seed, flight]))
+
+
+class Population(NamedTuple):
+    """What a set is drawn from.
+
+    Attributes:
+        strangers: effects of the second list alone (`strangers.py`).
+        spread: of derivatives, one standard deviation.
+        gusts: one of `conditions.KINDS`, or "mixed": each in turn.
+    """
+
+    strangers: bool = False
+    spread: float = SPREAD
+    gusts: str = "later"
+
+    def told(self) -> dict[str, Any]:
+        """What a manifest says of it: what is not as usual."""
+        return {name: value for name, value in self._asdict().items() if value != getattr(USUAL, name)}
+
+    @classmethod
+    def of(cls, manifest: Mapping[str, Any]) -> Population:
+        """That of a set with this manifest."""
+        return cls(**{name: manifest[name] for name in cls._fields if name in manifest})
+
+    def placed(self, drawn: Sequence[Design], seed: int) -> list[Design]:
+        """Cases as they were drawn, among such aircraft and in such gusts; a given seed does the same again."""
+        rng = np.random.default_rng(np.random.SeedSequence([seed, len(drawn), 5]))
+        order = rng.permutation(len(drawn)) % len(KINDS)
+        return [replace(wider(design, self.spread), gusts=KINDS[k] if self.gusts == "mixed" else self.gusts)
+                for design, k in zip(drawn, order, strict=True)]
+
+
+USUAL = Population()
 
 
 def designs(count: int, seed: int) -> list[Design]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from testbed.withheld import effects, gusts, instruments, manoeuvres, strangers, trim, unknown
 from testbed.withheld import plant as pl
+from testbed.withheld.conditions import Conditions
 from testbed.withheld.published import DTYPE, KNOBS, PUBLISHED, SENSOR_KNOBS, airframe
 
 CATALOGUE = {**effects.BY_NAME, **unknown.BY_NAME, **strangers.BY_NAME}
@@ -79,26 +80,25 @@ def fly(aircraft: Aircraft, manoeuvre: manoeuvres.Manoeuvre, gain: float = 1.0, 
     row = aircraft.row()
     y, u = trim.trimmed(row, manoeuvre.speed)
     plan = manoeuvres.inputs(manoeuvre, gain)
-    air = np.zeros(((len(plan) - 1) * pl.SUB + 1, 4)) if gust is None else gust
+    air = np.zeros(((len(plan) - 1) * pl.SUB + 1, pl.GUSTS)) if gust is None else gust
     Y, seen, C = pl.fly(row, y, u, plan, manoeuvres.HOLD, air)
     if not np.isfinite(Y).all() or np.max(np.abs(Y[:, [pl.PHI, pl.THETA]])) > 1.2:
         raise ArithmeticError("the aircraft departed")
     return Flown(Y, seen, C, instruments.exact(Y, seen, aircraft.instruments()))
 
 
-def turbulence(manoeuvre: manoeuvres.Manoeuvre, sigma: float, scale: float, rng: np.random.Generator) -> NDArray:
+def turbulence(manoeuvre: manoeuvres.Manoeuvre, given: Conditions, rng: np.random.Generator) -> NDArray:
     """Gusts for a manoeuvre at its speed."""
     samples = len(manoeuvres.inputs(manoeuvre)) - 1
-    return gusts.draw(samples, sigma, scale, manoeuvre.speed, PUBLISHED["tail_arm"], rng)
+    return gusts.draw(samples, given.sigma, given.scale, manoeuvre.speed, rng, given.gusts)
 
 
-def recorded(aircraft: Aircraft, manoeuvre: manoeuvres.Manoeuvre, gain: float, air: tuple[float, float, float],
+def recorded(aircraft: Aircraft, manoeuvre: manoeuvres.Manoeuvre, gain: float, given: Conditions,
              rng: np.random.Generator) -> tuple[Flown, dict[str, NDArray]]:
-    """Fly and read a manoeuvre; `air`: gust intensity, gust scale, noise level.
+    """Fly and read a manoeuvre.
 
     Raises:
         ArithmeticError: the aircraft cannot be flown.
     """
-    sigma, scale, level = air
-    flown = fly(aircraft, manoeuvre, gain, turbulence(manoeuvre, sigma, scale, rng))
-    return flown, instruments.read(flown.channels, level, rng)
+    flown = fly(aircraft, manoeuvre, gain, turbulence(manoeuvre, given, rng))
+    return flown, instruments.read(flown.channels, given.level, rng)

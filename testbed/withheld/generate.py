@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from testbed.withheld import files, published
-from testbed.withheld.draw import SPREAD, Design, designs, stranger_designs, wider
+from testbed.withheld.draw import USUAL, Design, Population, designs, stranger_designs
 from testbed.withheld.faults import excused, fault_count, fault_designs, spoiled
 from testbed.withheld.flights import CATALOGUE, Aircraft, recorded
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
@@ -34,8 +34,8 @@ T = TypeVar("T")
 
 
 def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
-             progress: Callable[[str], None] = lambda text: None, strangers: bool = False,
-             spread: float = SPREAD) -> dict[str, Any]:  # fmt: skip
+             progress: Callable[[str], None] = lambda text: None, population: Population = USUAL
+             ) -> dict[str, Any]:  # fmt: skip
     """Make (or finish, or draw again beside its keys) a sealed set in `out`: `records/`, `keys/`, `manifest.json`.
 
     Args:
@@ -44,8 +44,7 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
         seed: for development; from the operating system if omitted.
         workers: processes.
         progress: told after every group of cases.
-        strangers: of effects of the second list alone (`strangers.py`), without faults.
-        spread: of derivatives; distances in keys are those of SPREAD all the same.
+        population: without faults among strangers; distances in keys are those of the usual spread all the same.
 
     Returns:
         The manifest.
@@ -56,9 +55,10 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
     records, keys = out / "records", out / "keys"
     for folder in (records, keys):
         folder.mkdir(parents=True, exist_ok=True)
-    names, seed, known = _roll(keys / "seed.json", cases, seed, strangers, spread)
-    drawn = stranger_designs(cases, seed) if strangers else [*designs(cases, seed), *fault_designs(cases, seed)]
-    drawn = [wider(design, spread) for design in drawn]
+    names, seed, known = _roll(keys / "seed.json", cases, seed, population)
+    drawn = (stranger_designs(cases, seed) if population.strangers
+             else [*designs(cases, seed), *fault_designs(cases, seed)])  # fmt: skip
+    drawn = population.placed(drawn, seed)
     jobs = [(name, design) for name, design in zip(names, drawn, strict=True)
             if not ((records / name).is_dir() and (keys / f"{name}.json").is_file())]
     groups = [list(group) for _, group in groupby(sorted(jobs, key=lambda job: bank_of(job[1])),
@@ -74,8 +74,8 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
                 done += made
                 progress(f"flown {done} of {len(drawn)}")
     sealed = files.manifest(records, keys, names) | {
-        "numbers": published.digest(), "count": cases, "development_seed": seed if known else None} | (
-        {"strangers": True} if strangers else {}) | ({"spread": spread} if spread != SPREAD else {})
+        "numbers": published.digest(), "count": cases, "development_seed": seed if known else None,
+        **population.told()}
     if (out / "manifest.json").is_file() and files.read_json(out / "manifest.json") != sealed:
         raise ValueError(f"{out}: what was drawn is not what its manifest tells: another generator, processor or "
                          "other versions")
@@ -83,27 +83,26 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
     return sealed
 
 
-def _roll(path: Path, cases: int, seed: int | None, strangers: bool = False, spread: float = SPREAD
-          ) -> tuple[list[str], int, bool]:  # fmt: skip
+def _roll(path: Path, cases: int, seed: int | None, population: Population) -> tuple[list[str], int, bool]:
     """Names and seed of the set and whether it was given; kept with the keys: an interrupted draw goes on as begun."""
     if path.is_file():
         kept = files.read_json(path)
-        wanted = (cases, seed is not None, kept["seed"] if seed is None else seed, strangers, spread)
-        there = (kept["cases"], kept["given"], kept["seed"], kept.get("strangers", False), kept.get("spread", SPREAD))
+        wanted = (cases, seed is not None, kept["seed"] if seed is None else seed, population)
+        there = (kept["cases"], kept["given"], kept["seed"], Population.of(kept))
         if there != wanted:
-            raise ValueError(f"{path.parent.parent} holds a set of {kept['cases']} cases with another seed, number or "
-                             "spread")
+            raise ValueError(f"{path.parent.parent} holds a set of {kept['cases']} cases with another seed, number, "
+                             "spread or gusts")
         return kept["names"], kept["seed"], kept["given"]
     given = seed is not None
     seed = seed if seed is not None else secrets.randbits(120)
     rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
     names: list[str] = []
-    while len(names) < cases + (0 if strangers else fault_count(cases)):
+    while len(names) < cases + (0 if population.strangers else fault_count(cases)):
         name = rng.bytes(5).hex() if given else secrets.token_hex(5)
         if name not in names:
             names.append(name)
     files.write_text(path, json.dumps({"cases": cases, "seed": seed, "given": given, "names": names,
-                                      "strangers": strangers, "spread": spread}))
+                                      **population._asdict()}))
     return names, seed, given
 
 
@@ -114,12 +113,12 @@ def bank_of(design: Design) -> tuple[int, float]:
 
 def _make(group: list[tuple[str, Design]], records: Path, keys: Path) -> int:
     """Fly and write cases of one plan; cases that share gust and noise share their whitened bank."""
-    group = sorted(group, key=lambda job: job[1].air)
-    for _, same in groupby(group, key=lambda job: job[1].air):
+    group = sorted(group, key=lambda job: job[1].conditions)
+    for _, same in groupby(group, key=lambda job: job[1].conditions):
         shape: Geometry | None = None
         for name, design in same:
             if shape is None and design.parts:
-                shape = geometry(*bank_of(design), *design.air)
+                shape = geometry(*bank_of(design), design.conditions)
             texts, key = make_case(name, design, shape)
             if not (keys / f"{name}.json").is_file():  # of a set that was published, or a draw that was interrupted
                 files.write_text(keys / f"{name}.json", json.dumps(key, indent=1))
@@ -163,7 +162,7 @@ def _flown(name: str, design: Design, parts: Parts,
     texts: dict[str, str] = {}
     flights: list[Held] = []
     for i, manoeuvre in enumerate(PLANS[design.plan]):
-        flown, read = recorded(aircraft, manoeuvre, design.gain, design.air, design.random(i))
+        flown, read = recorded(aircraft, manoeuvre, design.gain, design.conditions, design.random(i))
         flights.append(held(flown, read))
         seen = read | dict(zip(files.COMMANDS, flown.commands.T, strict=True))
         if design.fault is not None:
@@ -171,7 +170,7 @@ def _flown(name: str, design: Design, parts: Parts,
         texts[f"{i + 1}.csv"] = files.record_text(seen, np.column_stack([seen[name] for name in files.COMMANDS]))
         texts[f"{i + 1}.toml"] = files.side_text(name, "diagnose" if i < DIAGNOSED else "held_out")
     closed = closures(design.baseline, parts, PLANS[design.plan][DIAGNOSED:], flights[DIAGNOSED:], design.gain,
-                      design.air)
+                      design.conditions)
     return texts, _key(name, design, parts, found) | {"held_out": closed}
 
 

@@ -1,7 +1,10 @@
 """Dryden turbulence (MIL-F-8785C) by Van Loan's discretisation at the integrator's own 5 ms step.
 
-Above 2000 ft the scale is 1750 ft on all axes and the intensities are equal; `scale` multiplies it. The tail meets
-the gust through the document's Pade approximation: with a true delay, a null at 1.5 m/s is told from the model.
+Above 2000 ft the scale is 1750 ft on all axes and the intensities are equal; `scale` multiplies it. How gusts differ
+along the aircraft is one of `conditions.KINDS`. "later": the tail meets the vertical one later, through the document's
+Pade approximation (with a true delay, a null at 1.5 m/s is told from the model). "turning": the air turns with the
+document's spectra of p, q and r. "at_once": all of the aircraft meets the same. "rolling": the tail meets the vertical
+gust later, and the air turns in p and r.
 """
 
 from __future__ import annotations
@@ -14,7 +17,8 @@ from scipy.linalg import cholesky, expm, solve_continuous_lyapunov
 from scipy.signal import lfilter
 
 from testbed.withheld.compiled import compiled
-from testbed.withheld.plant import DT, SUB
+from testbed.withheld.plant import DT, G_P, G_Q, G_R, G_TAIL, G_U, G_V, G_W, GUSTS, SUB
+from testbed.withheld.published import PUBLISHED
 
 LENGTH = 1750.0 * 0.3048  # m
 
@@ -29,6 +33,38 @@ def continuous(sigma: float, scale: float, speed: float) -> tuple[NDArray, NDArr
         A[first, first], A[first + 1, first], A[first + 1, first + 1] = -a, a, -a
         B[first, j] = drive
         C[j, first], C[j, first + 1] = math.sqrt(3.0 / 2.0), (1.0 - math.sqrt(3.0)) / math.sqrt(2.0)
+    return A, B, C
+
+
+def along(kind: str, sigma: float, scale: float, speed: float) -> tuple[NDArray, NDArray, NDArray]:
+    """A [n, n], B [n, m], C [GUSTS, n] of all that the aircraft meets; the first five states are those of `continuous`.
+
+    MIL-F-8785C 3.7.2: p is white noise through a lag of 4 b / (pi V), q = -dw/dt / V and r = dv/dt / V behind lags of
+    4 b / (pi V) and 3 b / (pi V).
+    """
+    A5, B5, C5 = continuous(sigma, scale, speed)
+    later, turns = kind in ("later", "rolling"), kind in ("turning", "rolling")
+    n, m = 5 + later + 3 * turns, 3 + turns
+    A, B, C = np.zeros((n, n)), np.zeros((n, m)), np.zeros((GUSTS, n))
+    A[:5, :5], B[:5, :3], C[[G_U, G_V, G_W], :5] = A5, B5, C5
+    v, w = C[G_V].copy(), C[G_W].copy()
+    C[G_TAIL] = w
+    if later:  # (1 - s delay/2) / (1 + s delay/2) of w: 2 z - w, z a lag of delay/2
+        half = 0.5 * PUBLISHED["tail_arm"] / speed
+        A[5], A[5, 5] = w / half, -1.0 / half
+        C[G_TAIL, :], C[G_TAIL, 5] = -w, 2.0
+    if turns:
+        p, q, r = range(n - 3, n)
+        span, length = PUBLISHED["span"], LENGTH * scale
+        lag = 4.0 * span / (math.pi * speed)
+        power = sigma**2 * 0.8 * (math.pi * length / (4.0 * span)) ** (1.0 / 3.0) / (length * speed)
+        A[p, p], B[p, 3], C[G_P, p] = -1.0 / lag, math.sqrt(math.pi * power) / lag, 1.0
+        A[q] += w / lag
+        A[r] += v / (0.75 * lag)
+        A[q, q], A[r, r] = -1.0 / lag, -1.0 / (0.75 * lag)
+        C[G_R], C[G_R, r] = v / (0.75 * lag * speed), -1.0 / (0.75 * lag * speed)
+        if not later:
+            C[G_Q], C[G_Q, q] = -w / (lag * speed), 1.0 / (lag * speed)
     return A, B, C
 
 
@@ -52,20 +88,30 @@ def _march(F: NDArray, noise: NDArray, x: NDArray) -> NDArray:
     return out
 
 
-def draw(samples: int, sigma: float, scale: float, speed: float, tail_arm: float, rng: np.random.Generator) -> NDArray:
-    """Gusts u, v, w and w at the tail [samples*SUB + 1, 4] along the body axes, stationary from the start."""
+def draw(samples: int, sigma: float, scale: float, speed: float, rng: np.random.Generator, kind: str = "later"
+         ) -> NDArray:  # fmt: skip
+    """Gusts [samples*SUB + 1, GUSTS] as the plant takes them, stationary from the start."""
     steps, step = samples * SUB + 1, DT / SUB
-    out = np.zeros((steps, 4))
+    out = np.zeros((steps, GUSTS))
     if sigma == 0.0:
         return out
+    if kind != "later":
+        A, B, C = along(kind, sigma, scale, speed)
+        out[:] = _drawn(A, B, steps, step, rng) @ C.T
+        return out
     A, B, C = continuous(sigma, scale, speed)
-    F, Q = discrete(A, B, step)
-    noise = rng.standard_normal((steps - 1, 5)) @ cholesky(Q + 1e-18 * np.eye(5), lower=True).T
-    stationary = solve_continuous_lyapunov(A, -B @ B.T)
-    start = cholesky(stationary + 1e-12 * np.eye(5), lower=True) @ rng.standard_normal(5)
-    out[:, :3] = _march(F, noise, start) @ C.T
-    out[:, 3] = _delayed(out[:, 2], tail_arm / speed, step)
+    out[:, [G_U, G_V, G_W]] = _drawn(A, B, steps, step, rng) @ C.T
+    out[:, G_TAIL] = _delayed(out[:, G_W], PUBLISHED["tail_arm"] / speed, step)
     return out
+
+
+def _drawn(A: NDArray, B: NDArray, steps: int, step: float, rng: np.random.Generator) -> NDArray:
+    """States [steps, n]."""
+    F, Q = discrete(A, B, step)
+    noise = rng.standard_normal((steps - 1, len(A))) @ cholesky(Q + 1e-18 * np.eye(len(A)), lower=True).T
+    stationary = solve_continuous_lyapunov(A, -B @ B.T)
+    start = cholesky(stationary + 1e-12 * np.eye(len(A)), lower=True) @ rng.standard_normal(len(A))
+    return np.asarray(_march(F, noise, start))
 
 
 def _delayed(w: NDArray, delay: float, step: float) -> NDArray:

@@ -25,7 +25,6 @@ from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
 DEVELOPMENT_SEED = 20_260_711
 SIGMAS, NULL_EVERY = (0.0, 0.5, 1.5), 7
 SMALLEST, LARGEST = 1.0, 2.0  # of the typical size
-TAIL_ARM = 7.544  # m; the gust at the tail is drawn with the others and not used
 TIERS = ("jsbsim", "jsbsim_as_it_is", "jsbsim_alone")
 # with clean reference flights; the same, its rolling moment not repaired; no change and no reference flights
 
@@ -86,7 +85,7 @@ def make_case(design: Design, root: Path) -> tuple[dict[str, str], dict[str, Any
         for i, manoeuvre in enumerate(PLANS[design.plan]):
             rng = np.random.default_rng(np.random.SeedSequence([design.seed, j, i]))
             samples = len(manoeuvres.inputs(manoeuvre)) - 1
-            gust = gusts.draw(samples, design.sigma, 1.0, manoeuvre.speed, TAIL_ARM, rng)
+            gust = gusts.draw(samples, design.sigma, 1.0, manoeuvre.speed, rng)
             flight = fly(flown, manoeuvre, 1.0, gust, errors)
             papers = papers or flight.papers  # of the clean aircraft where there is one: a change is not announced
             role = "reference" if mark else "diagnose" if i < DIAGNOSED else "held_out"

@@ -114,7 +114,7 @@ def fly(aircraft: Aircraft, manoeuvre: Manoeuvre, gain: float = 1.0, gust: NDArr
     Args:
         aircraft: with its change.
         manoeuvre, gain: as in `manoeuvres.inputs`.
-        gust: [samples*SUB + 1, 4] along the body axes; the tail's column is not used: JSBSim has no tail in the wind.
+        gust: [samples*SUB + 1, GUSTS]; only velocities are used: JSBSim has no tail in the wind.
         wrong: errors of the instruments, as `instruments.exact` knows them.
 
     Raises:
@@ -124,7 +124,7 @@ def fly(aircraft: Aircraft, manoeuvre: Manoeuvre, gain: float = 1.0, gust: NDArr
     held = settle(aircraft.fdm, aircraft.command, manoeuvre.speed)
     surfaces, plan = held[:3].copy(), manoeuvres.inputs(manoeuvre, gain)
     n, f = len(plan), aircraft.fdm
-    air = np.zeros(((n - 1) * pl.SUB + 1, 4)) if gust is None else gust
+    air = np.zeros(((n - 1) * pl.SUB + 1, pl.GUSTS)) if gust is None else gust
     theta0, phi0 = f["attitude/theta-rad"], f["attitude/phi-rad"]
     commands, rows, share, most = np.zeros((n, 5)), [], 1.0 - math.exp(-STEP / LAG), STEP * RATES
     commands[0] = held

@@ -57,7 +57,7 @@ def compared(flight: Flight) -> NDArray:
     row, Y, seen = _published(flight), flight.states, flight.outputs
     true = np.column_stack([seen[:, pl.FX : pl.FZ + 1], np.gradient(Y[:, pl.P : pl.R + 1], pl.DT, axis=0)])
     model, thrust = np.empty((len(Y), 6)), np.empty(len(Y))
-    d, o, u, still = np.empty(pl.STATES), np.empty(pl.OUTPUTS), np.zeros(5), np.zeros(4)
+    d, o, u, still = np.empty(pl.STATES), np.empty(pl.OUTPUTS), np.zeros(5), np.zeros(pl.GUSTS)
     for k, y in enumerate(Y):
         pl.rates(y, row[0], u, still, 0.0, d, o)
         model[k] = (*o[pl.FX : pl.FZ + 1], *d[pl.P : pl.R + 1])

@@ -23,6 +23,9 @@ STATES = 27
 # outputs beside the state
 VT, ALPHA, BETA, FX, FY, FZ, TL, TR, ADOT = range(9)
 OUTPUTS = 9
+# gusts: velocities of the air along the body axes, the vertical one at the tail, rates of the air about the axes
+G_U, G_V, G_W, G_TAIL, G_P, G_Q, G_R = range(7)
+GUSTS = 7
 DT, SUB = 0.02, 4  # s between samples, integration steps in one
 
 
@@ -71,12 +74,13 @@ def wind(y: Any, p: Any, t: float) -> tuple[float, float, float]:
 def flow(y: Any, p: Any, g: Any, t: float) -> tuple[float, tuple[float, ...]]:
     """Speed of the air along body x, and `met` as in `aerodynamics`."""
     uw, vw, ww = wind(y, p, t)
-    ua, va, wa = y[U] - uw - g[0], y[V] - vw - g[1], y[W] - ww - g[2]
+    ua, va, wa = y[U] - uw - g[G_U], y[V] - vw - g[G_V], y[W] - ww - g[G_W]
     plane = math.sqrt(ua * ua + wa * wa)
     V_ = math.sqrt(plane * plane + va * va)
     half = 2.0 * V_
     return ua, (V_, math.atan2(wa, ua), math.atan2(va, plane), wa / plane, ua / plane,
-                y[P] * p.span / half, y[Q] * p.chord / half, y[R] * p.span / half)  # fmt: skip
+                (y[P] - g[G_P]) * p.span / half, (y[Q] - g[G_Q]) * p.chord / half,
+                (y[R] - g[G_R]) * p.span / half)  # fmt: skip
 
 
 @part
@@ -97,7 +101,7 @@ def coefficients(y: Any, p: Any, g: Any, t: float, met: Any, facing: Any, ct: fl
     moved = de, y[DA], y[DR]
     wings = half_wings(met, p)
     cx, cz = forces(met, moved, wings, ct, (a - y[ALAG]) / 0.05, t, p)
-    tail = (g[2] - g[3]) / V_, y[Q] * p.tail_arm / V_, y[ADW], y[ADW2]
+    tail = (g[G_W] - g[G_TAIL]) / V_, (y[Q] - g[G_Q]) * p.tail_arm / V_, y[ADW], y[ADW2]
     cm = pitching(met, moved, wings[0], ct, tail, t, p)
     slipped = b - y[BLAG]
     cy, cl, cn = lateral(met, moved, wings, ct, -qS * cz / weight - 1.0, slipped, t, p)
@@ -194,7 +198,7 @@ def trail(y: Any, p: Any, V_: float, a: float, b: float, fy: float, d: Any) -> N
 
 @compiled
 def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
-    """Rates `d` of state `y` and outputs `o` under commands `u` and gusts `g` (u, v, w, w at the tail) at time t."""
+    """Rates `d` of state `y` and outputs `o` under commands `u` and gusts `g` [GUSTS] at time t."""
     density, lapse, gravity = air(y[H], p)
     ua, met = flow(y, p, g, t)
     V_, a, b = met[0], met[1], met[2]
@@ -217,7 +221,7 @@ def rates(y: Any, p: Any, u: Any, g: Any, t: float, d: Any, o: Any) -> None:
 @compiled
 def glide(y: Any, p: Any, u: Any, t: float, h: float, d1: Any, d2: Any, d3: Any, o: Any) -> None:
     """State `y` one step `h` on from time t, in still air; d1, d2, d3 and o are room to work in."""
-    still = np.zeros(4)
+    still = np.zeros(GUSTS)
     rates(y, p, u, still, t, d1, o)
     rates(y + 0.5 * h * d1, p, u, still, t + 0.5 * h, d2, o)
     rates(y + 0.75 * h * d2, p, u, still, t + 0.75 * h, d3, o)
@@ -233,7 +237,7 @@ def fly(row: Any, y0: Any, u0: Any, plan: Any, hold: Any, gusts: Any) -> tuple[A
         y0, u0: trimmed state [27] and commands [5].
         plan: what is added to the commands [samples, 5].
         hold: gains on pitch, pitch rate, bank, roll rate (elevator, elevator, aileron, aileron).
-        gusts: [samples*SUB + 1, 4], velocities of the air along the body axes, every 5 ms.
+        gusts: [samples*SUB + 1, GUSTS], every 5 ms.
 
     Returns:
         States [samples, 27], outputs [samples, 9], commands [samples, 5]; those of sample k acted until then.
@@ -242,7 +246,7 @@ def fly(row: Any, y0: Any, u0: Any, plan: Any, hold: Any, gusts: Any) -> tuple[A
     n, h, delay = plan.shape[0], DT / SUB, round(row[0].elevator_delay / DT)
     Y, out, C = np.zeros((n, STATES)), np.zeros((n, OUTPUTS)), np.zeros((n, 5))
     y, d1, d2, d3, o = y0.copy(), np.zeros(STATES), np.zeros(STATES), np.zeros(STATES), np.zeros(OUTPUTS)
-    u, g = u0.copy(), np.zeros(4)
+    u, g = u0.copy(), np.zeros(GUSTS)
     for k in range(n):
         if k > 0:
             C[k] = u0 + plan[k]

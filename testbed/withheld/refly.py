@@ -84,7 +84,7 @@ def flown_again(answer: dict[str, Any], key: dict[str, Any]) -> dict[str, Any]:
     model = told(answer)
     design = Design(key["tier"], true_parts(key), **key["design"])
     aircraft = Aircraft(design.baseline, design.parts)
-    flights = [held(*recorded(aircraft, m, design.gain, design.air, design.random(i)))
+    flights = [held(*recorded(aircraft, m, design.gain, design.conditions, design.random(i)))
                for i, m in enumerate(PLANS[design.plan]) if i >= DIAGNOSED]
     own = np.array([key["held_out"]["f"][name] for name in MOTION]) ** 2
     return {"after": gap_of(Aircraft(model.factors, model.parts, model.terms), flights, own),

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from testbed.withheld import distance, effects
+from testbed.withheld.conditions import Conditions
 from testbed.withheld.distance import Whitener
 from testbed.withheld.draw import MASS_RANGE, MOST, SPREAD
 from testbed.withheld.flights import Aircraft, Flown, fly
@@ -69,19 +70,19 @@ class Geometry:
     level: float
 
 
-def geometry(plan: int, gain: float, sigma: float, scale: float, level: float) -> Geometry:
-    """Whiten the bank of (plan, gain) as a case with this gust and noise sees it."""
+def geometry(plan: int, gain: float, given: Conditions) -> Geometry:
+    """Whiten the bank of (plan, gain) as a case in these gusts and noise sees it."""
     held = bank(plan, gain)
-    filters = [distance.whitener(m.speed, sigma, scale, level) for m in PLANS[plan][:DIAGNOSED]]
+    filters = [distance.whitener(m.speed, given) for m in PLANS[plan][:DIAGNOSED]]
     starts, columns = [], []
     for w, y, u, p in zip(filters, held.motion, held.inputs, held.paths, strict=True):
         count = w.starts.shape[1]
         silent = np.zeros((len(y), 12, count)), np.zeros((len(y), 5, count))
         s = distance.whiten(w, *silent, w.starts)
         starts.append(s)
-        columns.append(np.vstack([_clear(distance.whiten(w, y, u), s), p / level]))
+        columns.append(np.vstack([_clear(distance.whiten(w, y, u), s), p / given.level]))
     gram = np.sum([c.T @ c for c in columns], axis=0)
-    return Geometry(filters, starts, columns, np.asarray(gram), level)
+    return Geometry(filters, starts, columns, np.asarray(gram), given.level)
 
 
 def _clear(y: NDArray, starts: NDArray) -> NDArray:

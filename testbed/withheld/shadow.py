@@ -33,7 +33,7 @@ def _along(row: Any, Y: Any, C: Any, motion: Any, settle: int) -> tuple[Any, Any
     Velocities are those of Y through the changed aircraft's own air.
     """
     p = row[0]
-    n, h, delay, still = len(Y), pl.DT / pl.SUB, round(row[0].elevator_delay / pl.DT), np.zeros(4)
+    n, h, delay, still = len(Y), pl.DT / pl.SUB, round(row[0].elevator_delay / pl.DT), np.zeros(pl.GUSTS)
     states, out, error = Y.copy(), np.zeros((n, pl.OUTPUTS)), np.zeros((n, pl.STATES))
     d1, d2, d3, o = np.zeros(pl.STATES), np.zeros(pl.STATES), np.zeros(pl.STATES), np.zeros(pl.OUTPUTS)
     y, u, carried = Y[0].copy(), C[0].copy(), np.zeros(pl.STATES)

@@ -44,11 +44,11 @@ def _rows(tier: str, row: Callable[[Design, Geometry, Parts], dict[str, Any]], c
         only: effects; all if empty.
     """
     drawn = [d for d in designs(cases, seed) if d.tier == tier and (not only or {p[0] for p in d.parts} & set(only))]
-    drawn.sort(key=lambda d: (bank_of(d), d.air))
+    drawn.sort(key=lambda d: (bank_of(d), d.conditions))
     done = 0
-    for _, same in groupby(drawn, key=lambda d: (bank_of(d), d.air)):
+    for _, same in groupby(drawn, key=lambda d: (bank_of(d), d.conditions)):
         group = list(same)
-        shape = geometry(*bank_of(group[0]), *group[0].air)
+        shape = geometry(*bank_of(group[0]), group[0].conditions)
         for design in group:
             yield smaller_until(design.parts, partial(row, design, shape))
         done += len(group)

@@ -9,7 +9,7 @@ from testbed.withheld import plant as pl
 
 ALTITUDE = 2200.0  # m, of the flight records
 MOST_LEVER = 0.92  # leaves room for what the manoeuvres add
-_ZERO = np.zeros(4)
+_ZERO = np.zeros(pl.GUSTS)
 # rates that vanish; the seven unknown of flight and the commands that hold them
 _STILL = (pl.H, pl.U, pl.V, pl.W, pl.P, pl.Q, pl.R, pl.DE, pl.DA, pl.DR, pl.PL, pl.PR)
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from testbed.withheld import instruments
 from testbed.withheld import plant as pl
 from testbed.withheld.compiled import compiled
+from testbed.withheld.conditions import Conditions
 from testbed.withheld.distance import MOTION
 from testbed.withheld.draw import published_spread
 from testbed.withheld.flights import Aircraft, Flown, recorded
@@ -57,7 +58,7 @@ def held(flown: Flown, read: Mapping[str, NDArray]) -> Held:
 def _glide(row: Any, starts: Any, commands: Any, first: Any, steps: int) -> tuple[Any, Any]:
     """States [rows, steps + 1, 27] and outputs [rows, steps + 1, 9] from sample `first` of each row on, still air."""
     p = row[0]
-    h, delay, still = pl.DT / SUB, round(row[0].elevator_delay / pl.DT), np.zeros(4)
+    h, delay, still = pl.DT / SUB, round(row[0].elevator_delay / pl.DT), np.zeros(pl.GUSTS)
     Y, out = np.zeros((len(first), steps + 1, pl.STATES)), np.zeros((len(first), steps + 1, pl.OUTPUTS))
     d1, d2, d3, o, u = np.zeros(pl.STATES), np.zeros(pl.STATES), np.zeros(pl.STATES), np.zeros(pl.OUTPUTS), np.zeros(5)
     for i in range(len(first)):
@@ -119,34 +120,34 @@ def _read(flown: tuple[NDArray, NDArray], first: NDArray, wrong: dict[str, float
 
 
 @lru_cache(maxsize=256)
-def alone(manoeuvre: Manoeuvre, gain: float, air: tuple[float, float, float]) -> NDArray:
+def alone(manoeuvre: Manoeuvre, gain: float, given: Conditions) -> NDArray:
     """Mean squares per draw [DRAWS, 12]: the published aircraft's own records, with gust and noise, flown by itself."""
     rng = np.random.default_rng(0)
-    flights = [held(*recorded(Aircraft(), manoeuvre, gain, air, rng)) for _ in range(DRAWS)]
+    flights = [held(*recorded(Aircraft(), manoeuvre, gain, given, rng)) for _ in range(DRAWS)]
     return np.array([np.mean(residual_energy(Aircraft(), flight), axis=0) for flight in flights])
 
 
 @lru_cache(maxsize=64)
-def _spread_alone(manoeuvre: Manoeuvre, air: tuple[float, float, float]) -> NDArray:
+def _spread_alone(manoeuvre: Manoeuvre, given: Conditions) -> NDArray:
     """The same [NULL_DRAWS, 12] for aircraft with the published spread, flown again without it."""
     rng, spread = np.random.default_rng(1), np.random.default_rng(2)
-    flights = [held(*recorded(Aircraft(published_spread(spread)), manoeuvre, 1.0, air, rng))
+    flights = [held(*recorded(Aircraft(published_spread(spread)), manoeuvre, 1.0, given, rng))
                for _ in range(NULL_DRAWS)]
     return np.array([np.mean(residual_energy(Aircraft(), flight), axis=0) for flight in flights])
 
 
-def own_noise(manoeuvres: Manoeuvres, gain: float, air: tuple[float, float, float]) -> tuple[NDArray, float]:
+def own_noise(manoeuvres: Manoeuvres, gain: float, given: Conditions) -> tuple[NDArray, float]:
     """f_c squared [12] over some manoeuvres, and the gap that 95 % of draws of noise and gust alone stay below."""
-    drawn = np.mean([alone(m, gain, air) for m in manoeuvres], axis=0)
+    drawn = np.mean([alone(m, gain, given) for m in manoeuvres], axis=0)
     own = np.mean(drawn, axis=0)
     return own, float(np.quantile([gap(energy, own) for energy in drawn], 0.95))
 
 
-def spread_gap(manoeuvres: Manoeuvres, sigma: float) -> float:
+def spread_gap(manoeuvres: Manoeuvres, sigma: float, gusts: str = "later") -> float:
     """Gap that 95 % of aircraft with nothing but the published spread stay below (usual gust scale and noise)."""
-    air = (sigma, 1.0, 1.0)
-    drawn = np.mean([_spread_alone(m, air) for m in manoeuvres], axis=0)
-    own, _ = own_noise(manoeuvres, 1.0, air)
+    given = Conditions(sigma, 1.0, 1.0, gusts)
+    drawn = np.mean([_spread_alone(m, given) for m in manoeuvres], axis=0)
+    own, _ = own_noise(manoeuvres, 1.0, given)
     return float(np.quantile([gap(energy, own) for energy in drawn], 0.95))
 
 
@@ -161,7 +162,7 @@ def gap_of(model: Aircraft, flights: Sequence[Held], own: NDArray) -> float:
 
 
 def closures(baseline: Mapping[str, float], parts: Sequence[tuple[str, str, float]], manoeuvres: Manoeuvres,
-             flights: Sequence[Held], gain: float, air: tuple[float, float, float]) -> dict[str, Any]:
+             flights: Sequence[Held], gain: float, given: Conditions) -> dict[str, Any]:
     """What a key tells of held-out records: f_c, and gaps without and with the true effects.
 
     Args:
@@ -169,15 +170,16 @@ def closures(baseline: Mapping[str, float], parts: Sequence[tuple[str, str, floa
         parts: its true effects.
         manoeuvres, flights: held out.
         gain: of the inputs.
-        air: gust intensity, gust scale, noise level.
+        given: gusts and noise.
 
     Returns:
         `f` by channel; `before`, `oracle`: gaps of the published aircraft without and with the effects, `spread`: what
         95 % of aircraft without an effect stay below; `own_*`: the same for the aircraft with its own spread, `noise`
         what it reaches without any gap.
     """
-    own, noise = own_noise(manoeuvres, gain, air)
+    own, noise = own_noise(manoeuvres, gain, given)
     models = {"before": Aircraft(), "oracle": Aircraft(parts=parts), "own_before": Aircraft(baseline),
               "own_oracle": Aircraft(baseline, parts)}
-    return {"f": dict(zip(MOTION, np.sqrt(own).tolist(), strict=True)), "spread": spread_gap(manoeuvres, air[0]),
-            "noise": noise, **{name: gap_of(model, flights, own) for name, model in models.items()}}
+    return {"f": dict(zip(MOTION, np.sqrt(own).tolist(), strict=True)),
+            "spread": spread_gap(manoeuvres, given.sigma, given.gusts), "noise": noise,
+            **{name: gap_of(model, flights, own) for name, model in models.items()}}
