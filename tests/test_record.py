@@ -165,3 +165,36 @@ def test_mat_time_falls_back_and_bad_matrices_are_named(tmp_path: Path) -> None:
 
 def test_everything_measured_has_a_column_in_the_same_unit() -> None:
     assert {name: COLUMNS.get(name) for name, _, _ in MEASUREMENT_FIELDS} == {n: u for n, u, _ in MEASUREMENT_FIELDS}
+
+
+@pytest.mark.parametrize(("theirs", "ours"), [
+    ("[sensors.alpha]\nposition = [5.6, 0.0, 0.0]\ncorrected_to_cg = true\n",
+     {"alpha": {"position": [5.6, 0.0, 0.0], "corrected": True}}),
+    ("[sensors.vanes]\nlag_s = 0.01\n[sensors.beta]\nlag = 0.02\n", {"alpha": {"lag": 0.01}, "beta": {"lag": 0.02}}),
+    ("[sensors.accelerometer]\nposition_m = [0.1, 0.0, 0.2]\n", {"accelerometers": {"position": [0.1, 0.0, 0.2]}}),
+    ("[sensors]\npitot = {lag = 0.08}\nrecorder = {frequency_hz = 10.0}\n",
+     {"airspeed": {"lag": 0.08}, "filter": {"frequency": 10.0}}),
+])  # fmt: skip
+def test_sensors_are_read_in_the_words_of_others_too(tmp_path, theirs, ours):
+    """`corrected_to_cg` was passed over in silence, and what was corrected already corrected again."""
+    (tmp_path / "a.csv").write_text("time,airspeed\n0.0,60.0\n0.02,60.0\n")
+    (tmp_path / "a.toml").write_text(theirs)
+    record = read(tmp_path / "a.csv")
+    assert record.meta.sensors == ours and not record.problems
+
+
+def test_what_is_not_read_of_sensors_is_told(tmp_path):
+    (tmp_path / "a.csv").write_text("time,airspeed\n0.0,60.0\n0.02,60.0\n")
+    (tmp_path / "a.toml").write_text("[sensors]\nalpha = {lag = 0.01, filter_hz = 10.0}\nattitude = {lag = 0.02}\n")
+    record = read(tmp_path / "a.csv")
+    assert record.meta.sensors == {"alpha": {"lag": 0.01}}
+    (told,) = record.problems
+    assert (told.channel, told.repaired) == ("sensors", False)
+    assert told.kind == "not read of the side file: sensors.alpha.filter_hz, sensors.attitude"
+
+
+def test_sensors_that_are_no_table_are_refused(tmp_path):
+    (tmp_path / "a.csv").write_text("time,airspeed\n0.0,60.0\n0.02,60.0\n")
+    (tmp_path / "a.toml").write_text('sensors = "good"\n')
+    with pytest.raises(InputError, match="sensors must be a table"):
+        read(tmp_path / "a.csv")

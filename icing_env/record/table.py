@@ -13,7 +13,17 @@ from typing import Any
 import numpy as np
 
 from icing_env.errors import InputError, nearest
-from icing_env.record.flight import COLUMNS, OWNER_COLUMNS, ROLES, FlightRecord, FloatArray, Geometry, RecordMeta
+from icing_env.record.flight import (
+    COLUMNS,
+    OWNER_COLUMNS,
+    ROLES,
+    DataProblem,
+    FlightRecord,
+    FloatArray,
+    Geometry,
+    RecordMeta,
+)
+from icing_env.record.sensors import understood
 
 # Largest magnitude (rad) that a column in radians can reach; beyond it the column is in degrees.
 RADIAN_LIMITS = {
@@ -56,7 +66,10 @@ def record_from_table(table: Mapping[str, FloatArray], path: Path, first_row: in
     channels = {name: values for name, values in table.items() if name in COLUMNS}
     owner = {name: values for name, values in table.items() if name in OWNER_COLUMNS}
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    return FlightRecord(channels, read_side(path.with_suffix(".toml"), path.stem, digest), owner)
+    meta, unread = read_side(path.with_suffix(".toml"), path.stem, digest)
+    told = f"not read of the side file: {', '.join(unread)}"
+    problems = (DataProblem("sensors", told, float(time[0]), float(time[-1]), False),) if unread else ()
+    return FlightRecord(channels, meta, owner, problems)
 
 
 def check_radians(table: Mapping[str, FloatArray], where: str) -> None:
@@ -70,10 +83,14 @@ def check_radians(table: Mapping[str, FloatArray], where: str) -> None:
                 )
 
 
-def read_side(path: Path, name: str, digest: str) -> RecordMeta:
-    """Read the TOML beside a record; an empty RecordMeta (with name and digest) where there is none."""
+def read_side(path: Path, name: str, digest: str) -> tuple[RecordMeta, list[str]]:
+    """Read the TOML beside a record; an empty RecordMeta (with name and digest) where there is none.
+
+    Returns:
+        It, and what its table `sensors` has that is not read.
+    """
     if not path.is_file():
-        return RecordMeta(name=name, sha256=digest)
+        return RecordMeta(name=name, sha256=digest), []
     try:
         side = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -89,6 +106,9 @@ def read_side(path: Path, name: str, digest: str) -> RecordMeta:
     mass = side.get("mass")
     if mass is not None and (not isinstance(mass, int | float) or not mass > 0):
         raise InputError(f"{path}: mass must be a positive number of kg, got {mass!r}")
+    if not isinstance(side.get("sensors", {}), dict):
+        raise InputError(f"{path}: sensors must be a table such as [sensors] alpha = {{lag = 0.01}}")
+    sensors, unread = understood(side.get("sensors", {}))
     return RecordMeta(
         aircraft=str(side.get("aircraft", "")),
         flight=str(side.get("flight", "")),
@@ -96,12 +116,12 @@ def read_side(path: Path, name: str, digest: str) -> RecordMeta:
         inertia=None if inertia is None else (inertia[0], inertia[1], inertia[2], inertia[3]),
         cg=cg,
         role=side.get("role", "diagnose"),
-        sensors=side.get("sensors", {}),
+        sensors=sensors,
         notes=str(side.get("notes", "")),
         geometry=None if geometry is None else Geometry(*geometry),
         name=name,
         sha256=digest,
-    )
+    ), unread
 
 
 def _numbers(side: dict[str, Any], key: str, parts: tuple[str, ...], path: Path) -> list[float] | None:

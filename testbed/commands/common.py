@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import fields, is_dataclass
 from functools import wraps
 from inspect import cleandoc
@@ -34,6 +34,34 @@ def verb(name: str, example: str, **settings: Any) -> Callable[[Function], click
         return click.command(name, help=text, **settings)(function)
 
     return decorate
+
+
+class Listing(click.Command):
+    """A verb whose repeated options of files may also be given once, with all that they list behind: `--held-out A B`.
+
+    Only behind a first RECORD, lest `--held-out A RECORD` leaves none.
+    """
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Repeat the option before each of its files."""
+        lists = {name for p in self.params if isinstance(p, click.Option) and p.metavar == "RECORD" for name in p.opts}
+        return super().parse_args(ctx, repeated(args, lists))
+
+
+def repeated(args: list[str], lists: Collection[str]) -> list[str]:
+    """Arguments in which every file behind an option of `lists` has that option before it."""
+    if not args or args[0].startswith("-"):
+        return args
+    out, option, first = list[str](), "", False
+    for word in args:
+        if word.startswith("-"):
+            option, first = word if word in lists else "", True
+        elif option and not first:
+            out.append(option)
+        else:
+            first = False
+        out.append(word)
+    return out
 
 
 def own_effects(function: Function) -> Function:

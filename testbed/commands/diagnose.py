@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from icing_env.errors import InputError
-from testbed.commands.common import own_effects, print_json, print_table, verb
+from testbed.commands.common import Listing, own_effects, print_json, print_table, verb
 from testbed.planning import before_a_flight
 
 if TYPE_CHECKING:
@@ -23,12 +23,12 @@ icing diagnose --plan "elevator doublets at 55 m/s" --gusts 1.5"""
 RECORDS = click.Path(path_type=Path)
 
 
-@verb("diagnose", EXAMPLE)
+@verb("diagnose", EXAMPLE, cls=Listing)
 @click.argument("records", nargs=-1, metavar="RECORD...", type=RECORDS)
 @click.option("--held-out", multiple=True, metavar="RECORD", type=RECORDS,
-              help="Never fitted: how far the gap closes is measured on it. May be repeated.")  # fmt: skip
+              help="Never fitted: how far the gap closes is measured on it. May be repeated or list several.")
 @click.option("--reference", multiple=True, metavar="RECORD", type=RECORDS,
-              help="The same aircraft without the gap: corrects the model first. May be repeated.")  # fmt: skip
+              help="The same aircraft without the gap: corrects the model first. May be repeated or list several.")
 @click.option("--without", multiple=True, metavar="EFFECT", help="Leave an effect out of the library. May be repeated.")
 @click.option("--out", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
               help="Write diagnosis.json and report.html there.")  # fmt: skip
@@ -47,7 +47,8 @@ def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tu
 
     Records are .csv, .parquet or SIDPAC's .mat. Every effect of `icing effects` is tried, beside "no gap" and "nothing
     in the library"; effects that the records cannot tell apart are named together. Names and notes of files play no
-    part. With --plan no RECORD is needed: it says what manoeuvres would reveal before they are flown.
+    part; a RECORD whose side file has the role "held_out" or "reference" is taken as that. With --plan no RECORD is
+    needed: it says what manoeuvres would reveal before they are flown.
     """
     from rich.console import Console
 
@@ -56,10 +57,11 @@ def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tu
 
     if not records:
         raise InputError("no RECORD to diagnose: give at least one, or a manoeuvre with --plan")
+    shown, unseen, clean = by_role(records)
     with Console(stderr=True).status("reading the records") as status:
         own = None if simulator is None else from_file(simulator)
-        found = diagnose(read_all(records), read_all(held_out), read_all(reference), without, seed, status.update,
-                         climb=ladder, simulator=own)  # fmt: skip
+        found = diagnose(shown, [*unseen, *read_all(held_out)], [*clean, *read_all(reference)], without, seed,
+                         status.update, climb=ladder, simulator=own)  # fmt: skip
         result = answer(found)
         if policies:
             result["policies"] = rank_policies(result, seed, status.update)
@@ -116,6 +118,20 @@ def read_all(paths: tuple[Path, ...]) -> list[FlightRecord]:
     from icing_env.record import read
 
     return [read(path) for path in paths]
+
+
+def by_role(paths: tuple[Path, ...]) -> tuple[list[FlightRecord], list[FlightRecord], list[FlightRecord]]:
+    """Records to diagnose, those held out and the references, as the side files of the given ones have it.
+
+    Raises:
+        InputError: none is left to diagnose.
+    """
+    given = read_all(paths)
+    shown, unseen, clean = ([r for r in given if r.meta.role == role] for role in ("diagnose", "held_out", "reference"))
+    if not shown:
+        raise InputError(f"{paths[0].with_suffix('.toml')}: role is '{given[0].meta.role}', and none of the given "
+                         'records has the role "diagnose": give one that has, or has none')
+    return shown, unseen, clean
 
 
 def answer(found: Diagnosis) -> dict[str, Any]:
