@@ -15,7 +15,8 @@ from icing_env.record import FlightRecord, FloatArray
 from sim2real.actuators.surfaces import placed
 from sim2real.actuators.timing import in_step
 from sim2real.answer import credible, describe, detection_limits, judge, problems, provenance, ranked
-from sim2real.baseline.references import Baseline, fit_baseline
+from sim2real.baseline.loading import of_another_loading, otherwise_loaded
+from sim2real.baseline.references import Baseline, fit_baseline, uncertain
 from sim2real.change import Changed, changed, flown_freely
 from sim2real.closing import gap
 from sim2real.closing.parts import Flown
@@ -30,6 +31,7 @@ from sim2real.planning.manoeuvre import next_manoeuvre
 from sim2real.posterior.hypotheses import Posterior
 from sim2real.prediction.gusts import Gusts
 from sim2real.records.instruments import with_recorder
+from sim2real.records.late_power import prompt
 from sim2real.records.reconstruct import Reconstruction, reconstruct
 from sim2real.records.side_by_side import algebra_in_one_thread
 from sim2real.rollout import Rollout, flying_as
@@ -159,11 +161,13 @@ def _at_hand(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord], 
     for name in without:
         if name not in effects.LIBRARY:
             raise InputError(f"no effect '{name}' to leave out: {nearest(name, list(effects.LIBRARY))}")
-    candidates = bank(without)
+    candidates = bank(without, uncertain() if reference else ())
     baseline = Baseline(aircraft.load(), np.eye(len(candidates.nuisances)))
     if reference:
         progress("fitting the model to the reference flights")
         baseline = fit_baseline(_reconstructed(reference, None, simulator), candidates)
+        if otherwise_loaded(reference, records):
+            baseline = of_another_loading(baseline, candidates.nuisances)
         candidates = replace(candidates, clean=baseline.clean)
     return _AtHand(_reconstructed(records, baseline, simulator), _reconstructed(held_out, baseline, simulator),
                    candidates, baseline, without)
@@ -206,7 +210,7 @@ def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, s
     records = with_recorder(records)
     flights = [reconstruct(record) for record in records] if baseline is None else [
         replace(reconstruct(record, baseline.near(record)), inadequacy=baseline.inadequacy) for record in records]
-    flights = in_common([placed(flight) for flight in in_step(flights)])
+    flights = in_common([placed(flight) for flight in prompt(in_step(flights))])
     if simulator is None:
         return flights
     yours = [flying_as(reconstruct(record), simulator) for record in records]

@@ -56,7 +56,7 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
         Evidence of every record, the posterior, and the baseline with the spread that the records ask for.
     """
     progress("fitting the model's own uncertainty")
-    kind = kind_at_first(flights)
+    kind = kind_at_first(flights, baseline.kind)
     for _ in range(2):  # once more where gusts show to be of another kind
         moved, centre, known = followed(flights, candidates, baseline, kind)
         guess = first_guess(moved, candidates, baseline, untestable, centre, known)

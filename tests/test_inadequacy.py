@@ -21,6 +21,7 @@ from sim2real.signatures.evidence import gather
 from sim2real.signatures.means import without_means
 from sim2real.signatures.whitening import SETTLE
 from sim2real.words import of_the_model
+from testbed.withheld.conditions import Conditions
 from testbed.withheld.draw import published_spread
 from testbed.withheld.files import record_text, side_text
 from testbed.withheld.flights import Aircraft, recorded
@@ -35,7 +36,8 @@ def flown(folder, role: str, factors: dict[str, float], seed: int) -> list:
     """Records of three manoeuvres in still air by the generator's plant."""
     out = []
     for i, manoeuvre in enumerate(PLANS[2][:DIAGNOSED]):
-        flight, seen = recorded(Aircraft(factors), manoeuvre, 1.15, (0.0, 1.0, 1.0), np.random.default_rng([seed, i]))
+        rng = np.random.default_rng([seed, i])
+        flight, seen = recorded(Aircraft(factors), manoeuvre, 1.15, Conditions(0.0, 1.0, 1.0), rng)
         (folder / f"{role}{i}.csv").write_text(record_text(seen, flight.commands))
         (folder / f"{role}{i}.toml").write_text(side_text("x", role))
         out.append(read(folder / f"{role}{i}.csv"))

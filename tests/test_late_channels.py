@@ -12,13 +12,14 @@ from icing_env.errors import InputError
 from icing_env.record import FlightRecord, read
 from sim2real.records.reconstruct import reconstruct
 from testbed.withheld import files, flights, manoeuvres
+from testbed.withheld.conditions import Conditions
 
 
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory) -> FlightRecord:
     """Doublets and 3-2-1-1 in all axes at 72 m/s in light gusts."""
     rng = np.random.default_rng(4)
-    flown, seen = flights.recorded(flights.Aircraft(), manoeuvres.PLANS[0][1], 1.0, (0.5, 1.0, 1.0), rng)
+    flown, seen = flights.recorded(flights.Aircraft(), manoeuvres.PLANS[0][1], 1.0, Conditions(0.5, 1.0, 1.0), rng)
     path = tmp_path_factory.mktemp("sound") / "1.csv"
     path.write_text(files.record_text(seen, flown.commands))
     return read(path)

@@ -21,6 +21,7 @@ from sim2real.prediction.kalman import gains
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures import gust_intensity
 from sim2real.signatures.gust_intensity import SIGMAS, choose_gain, likelihoods
+from testbed.withheld.conditions import Conditions
 from testbed.withheld.draw import SPREAD, published_spread
 from testbed.withheld.files import record_text, side_text
 from testbed.withheld.flights import Aircraft, recorded
@@ -37,7 +38,7 @@ def flown(folder, seed: int) -> tuple[list[Reconstruction], dict[str, float]]:
     rng = np.random.default_rng(seed)
     factors, out = published_spread(rng), []
     for i, manoeuvre in enumerate(PLANS[2][:DIAGNOSED]):
-        flight, seen = recorded(Aircraft(factors), manoeuvre, 1.15, (SIGMA, SCALE, LEVEL), rng)
+        flight, seen = recorded(Aircraft(factors), manoeuvre, 1.15, Conditions(SIGMA, SCALE, LEVEL), rng)
         (folder / f"{i}.csv").write_text(record_text(seen, flight.commands))
         (folder / f"{i}.toml").write_text(side_text("x", "diagnose"))
         out.append(read(folder / f"{i}.csv"))

@@ -17,6 +17,7 @@ from icing_env.errors import InputError
 from icing_env.record import FlightRecord, read
 from testbed.flight import fly
 from testbed.withheld import effects
+from testbed.withheld.conditions import Conditions
 from testbed.withheld.files import record_text, side_text
 from testbed.withheld.flights import Aircraft, recorded
 from testbed.withheld.manoeuvres import PLANS
@@ -119,7 +120,8 @@ def test_a_late_vane_in_calm_air_does_not_bend_the_factor_of_ay(effect: str, tmp
     size = effects.BY_NAME[effect].typical * (1.0 if effect == "vane_lag" else 2.0)
     for plan, manoeuvre in enumerate((PLANS[0][0], PLANS[1][1])):
         rng = np.random.default_rng(plan)
-        flown, channels = recorded(Aircraft({}, [(effect, "same", size)]), manoeuvre, 1.0, (0.0, 1.0, 1.5), rng)
+        given = Conditions(0.0, 1.0, 1.5)
+        flown, channels = recorded(Aircraft({}, [(effect, "same", size)]), manoeuvre, 1.0, given, rng)
         path = tmp_path / f"{plan}.csv"
         path.write_text(record_text(channels, flown.commands))
         path.with_suffix(".toml").write_text(side_text("f", "diagnose"))

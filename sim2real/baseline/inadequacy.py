@@ -16,11 +16,12 @@ from icing_env.record import FloatArray
 from sim2real.library.candidates import Bank
 from sim2real.posterior.attribution import reduce, with_prior
 from sim2real.posterior.generic import fit_unknown
+from sim2real.prediction.gusts import KINDS, LATER, Kind
 from sim2real.prediction.kalman import Gain, gains
 from sim2real.records.channels import MEASURED
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.evidence import Evidence, gather
-from sim2real.signatures.gust_intensity import SIGMAS, likelihoods
+from sim2real.signatures.gust_intensity import SIGMAS, asked, likelihoods
 from sim2real.signatures.tempering import total
 
 BATCHES = (100, 30, 10, 4)  # into which a flight is cut
@@ -29,13 +30,18 @@ WALKS = (1.0, 3.0, 10.0, 30.0, 100.0)  # times `kalman.WALK`
 OF_REFERENCES = WALKS[:-1]  # more of it would pass for gusts, or gusts for it
 
 
-def walk(flights: Sequence[Reconstruction]) -> float:
-    """The likeliest of OF_REFERENCES, whatever the gusts of each flight."""
-    scores = []
-    for times in OF_REFERENCES:
-        disturbed = [replace(f, inadequacy=replace(f.inadequacy, walk=times)) for f in flights]
-        scores.append(sum(max(likelihoods(f, gains(f, SIGMAS))) for f in disturbed))
-    return OF_REFERENCES[int(np.argmax(scores))]
+def walk(flights: Sequence[Reconstruction]) -> tuple[float, Kind]:
+    """The likeliest of OF_REFERENCES, and kind of gusts, whatever the intensity in each flight."""
+    scores = {(times, kind): sum(_likely(replace(f, inadequacy=replace(f.inadequacy, walk=times)), kind)
+                                 for f in flights) for times in OF_REFERENCES for kind in KINDS}  # fmt: skip
+    return max(scores, key=lambda of: scores[of])
+
+
+def _likely(flight: Reconstruction, kind: Kind) -> float:
+    """Log likelihood of a sample in the likeliest gusts of a kind, less what is asked for that."""
+    options = gains(flight, SIGMAS if kind == LATER else SIGMAS[::2], kind)
+    scores = likelihoods(flight, options)
+    return max(scores) - asked(options[int(np.argmax(scores))])
 
 
 def colour(evidences: Sequence[Evidence]) -> tuple[dict[str, float], dict[str, float]]:

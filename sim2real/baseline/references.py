@@ -19,14 +19,21 @@ from icing_env import aircraft
 from icing_env.record import FlightRecord, FloatArray
 from sim2real.baseline.inadequacy import WALKS, clean, colour, walk
 from sim2real.library.candidates import NUISANCE_STEP, Bank, Nuisance
+from sim2real.prediction.gusts import LATER, Kind
+from sim2real.prediction.kalman import follow
+from sim2real.records.channels import SURFACES
 from sim2real.records.reconstruct import Inadequacy, Reconstruction
 from sim2real.signatures.evidence import Evidence, gather
+from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
 from sim2real.signatures.tempering import temper
 
 ROUNDS, SETTLED = 10, 4.0  # flown steps, and the whitened length of one that ends them
 AGAIN = 2  # the round after which gust intensities are chosen anew at every step: what does not fit passes for gusts
 LONGEST = 40.0  # standard deviations that a step may move a number
 REFERENCE_SPEED = 65.0  # m/s, where a number has its value; it changes with (65/V)^2, as alpha does in level flight
+# Weak derivatives, on which sources and flights differ by 10 to 30 %: times the published spread
+WEAK = dict.fromkeys(
+    ("CZ_q", "CZ_elevator", "CY_p", "CY_r", "CY_rudder", "Cl_r", "Cl_rudder", "Cn_p", "Cn_aileron"), 3.0)
 CHANGES = 1.0  # prior standard deviation of that change at twice the dynamic pressure, in that of the value (assumed)
 # What the published spread leaves alone and another aircraft may have: standard deviations (assumed). No cubes: where
 # the references did not fly, they run away.
@@ -41,7 +48,15 @@ BEYOND: dict[str, float] = {
     "CZ_alpha2": 0.3, "Cm_alpha2": 0.1, "Cm_elevator2": 0.1, "CX_beta2": 0.1, "CZ_beta2": 0.3, "Cm_beta2": 0.1,
     "Cm_alpha_elevator": 0.1, "CZ_alpha_q": 5.0, "Cm_alpha_q": 5.0, "CY_alpha_beta": 0.1, "Cl_alpha_beta": 0.02,
     "Cn_alpha_beta": 0.02, "CY_alpha_p": 0.2, "Cl_alpha_p": 0.5, "Cn_alpha_p": 0.2, "Cl_alpha_r": 0.2,
-    "Cn_alpha_r": 0.2, "CY_alpha_rudder": 0.1, "Cn_alpha_aileron": 0.02, "Cn_alpha_rudder": 0.05}
+    "Cn_alpha_r": 0.2, "CY_alpha_rudder": 0.1, "Cn_alpha_aileron": 0.02, "Cn_alpha_rudder": 0.05,
+    # instruments that are alike in all flights
+    "bias_airspeed": 0.2, "bias_alpha": 1.5e-3, "bias_beta": 1.5e-3, "bias_p": 5e-4, "bias_q": 5e-4, "bias_r": 5e-4,
+    "bias_phi": 1.5e-3, "bias_theta": 1.5e-3, "bias_ax": 0.02, "bias_ay": 0.02, "bias_az": 0.03}
+# surfaces' paths and what is read of them
+PATHS = {"spool_time": 0.1,
+         **{f"{surface}_{of}": size for surface in SURFACES for of, size in (("offset", 1e-3), ("gearing", 0.01))}}
+INSTRUMENTS = ("scale_alpha", "scale_beta", *(name for name in BEYOND if name.startswith("bias_")), *PATHS)
+STEADY = 1e-3  # the change with the flight condition of what an instrument or a path has
 # a matter of each record and its recorder
 FIXED = ("mass", "thrust", "filter_frequency", "vane_lag", "pitot_lag", "boom_gain")
 REPEATABLE = 0.2  # standard deviations: no number is known better for another flight (assumed: 1 % of a derivative)
@@ -55,7 +70,7 @@ class Baseline:
     `changes`: what is added to PARAMETERS per unit of (65 m/s / V)^2 - 1, by name; `inadequacy`: what is
     left then; `clean`: what generic terms explain of the references all the same, log evidence by component;
     `spread`: how many times the published spread its derivatives are uncertain by (`baseline.spread`); None where
-    reference flights say how well they are known.
+    reference flights say how well they are known. `kind`: of the gusts along reference flights.
     """
 
     parameters: NDArray
@@ -64,6 +79,7 @@ class Baseline:
     inadequacy: Inadequacy = field(default_factory=Inadequacy)
     clean: dict[str, float] = field(default_factory=dict)
     spread: float | None = 1.0
+    kind: Kind = LATER
 
     def near(self, record: FlightRecord) -> NDArray:
         """PARAMETERS row at the record's median airspeed."""
@@ -94,7 +110,20 @@ def directions(candidates: Bank) -> tuple[Nuisance, ...]:
     for nuisance in candidates.nuisances:
         size = nuisance.factor * (1.0 if nuisance.absolute else abs(float(row[_first(nuisance)])))
         out.append(replace(nuisance, factor=size, absolute=True, only="nowhere" if nuisance.name in FIXED else ""))
-    return (*out, *(Nuisance(name, name, size, True) for name, size in BEYOND.items()))
+    known = {nuisance.name for nuisance in out}
+    return (*out, *(_beyond(name) for name in (*BEYOND, *PATHS) if name not in known))
+
+
+def _beyond(name: str) -> Nuisance:
+    return Nuisance(name, name, (BEYOND | PATHS)[name], True)
+
+
+def uncertain() -> tuple[Nuisance, ...]:
+    """Nuisances beside the usual ones where reference flights tell the model's numbers.
+
+    What these tell badly would else be told as something unknown, or as an effect that changes the same number.
+    """
+    return tuple(_beyond(name) for name in (*BEYOND, *PATHS))
 
 
 def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank) -> Baseline:
@@ -116,8 +145,11 @@ class Fit:
         n = len(moves)
         self.flights, self.moves, self.at = flights, moves, at
         self.bank = Bank(tuple(moves), (), (), 1 + n)
-        self.x, self.spread = np.zeros(2 * n), np.concatenate([np.ones(n), np.full(n, CHANGES)])
-        self.walk = WALKS[-1]  # while the model may still be far off
+        changing = [STEADY if move.name in INSTRUMENTS else CHANGES for move in moves]
+        values = [WEAK.get(move.name, 1.0) for move in moves]
+        self.widest = np.tile([1.0 if move.name in INSTRUMENTS else np.inf for move in moves], 2)
+        self.x, self.spread = np.zeros(2 * n), np.concatenate([values, changing])
+        self.walk, self.kind = WALKS[-1], LATER  # while the model may still be far off
         self.precision = np.zeros((0, 0))
         self.evidences: list[Evidence] = []
 
@@ -126,7 +158,7 @@ class Fit:
         for k in range(ROUNDS):
             settled = self.step(again=k > AGAIN) < SETTLED
             if k == AGAIN or (k > AGAIN and settled):
-                last, self.walk = self.walk, walk(self.flown())
+                last, (self.walk, self.kind) = self.walk, walk(self.flown())
                 if k > AGAIN and self.walk == last:
                     break
 
@@ -146,10 +178,12 @@ class Fit:
         Args:
             again: whether gust intensities are chosen anew.
         """
-        gains = [None] * len(self.flights) if again or not self.evidences else [e.gain for e in self.evidences]
-        self.evidences = [gather(f, self.bank, gain) for f, gain in zip(self.flown(), gains, strict=True)]
+        flown = self.flown()
+        known = ([follow(f, choose_gain(f, SIGMAS, (), self.kind)) for f in flown] if again or not self.evidences
+                 else [e.gain for e in self.evidences])  # fmt: skip
+        self.evidences = [gather(f, self.bank, gain) for f, gain in zip(flown, known, strict=True)]
         information, slope, tempering = _normal(self.evidences, self.at)
-        prior = np.diag(1.0 / np.maximum(self.spread, np.abs(self.x)) ** 2)
+        prior = np.diag(1.0 / np.maximum(self.spread, np.minimum(np.abs(self.x), self.widest)) ** 2)
         self.precision = information / tempering + prior
         step = -np.linalg.solve(self.precision, slope / tempering + prior @ self.x)
         self.x = self.x + step * LONGEST / max(float(np.max(np.abs(step))), LONGEST)
@@ -161,7 +195,7 @@ class Fit:
         left = Inadequacy(self.walk, *colour(self.evidences))
         flown = [replace(flight, inadequacy=left) for flight in self.flown()]
         told = clean(flown, [e.gain for e in self.evidences], candidates, found.precision)
-        return replace(found, inadequacy=left, clean=told)
+        return replace(found, inadequacy=left, clean=told, kind=self.kind)
 
 
 def _possible(row: NDArray) -> NDArray:

@@ -160,9 +160,9 @@ def at_few_sizes(candidates: Bank, untestable: Iterable[str] = ()) -> Bank:
     return replace(candidates, families=tuple(families), terms=(), size=row)
 
 
-def bank(without: Iterable[str] = ()) -> Bank:
-    """The candidates of the whole library less `without`."""
-    noise, families, terms = nuisances(), [], []
+def bank(without: Iterable[str] = (), beside: Iterable[Nuisance] = ()) -> Bank:
+    """The candidates of the whole library less `without`; `beside`: nuisances beside the usual ones."""
+    noise, families, terms = (*nuisances(), *beside), [], []
     row = 1 + len(noise)
     for effect in effects.LIBRARY.values():
         if effect.name in without or effect.name == "turbulence":

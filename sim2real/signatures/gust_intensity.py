@@ -48,14 +48,14 @@ def choose_gain(flight: Reconstruction, sigmas: Sequence[float], pushed: Sequenc
     return gains(flight, (_peak(sigmas[k - 1 : k + 2], scores[k - 1 : k + 2]),), kind)[0]
 
 
-def kind_at_first(flights: Sequence[Reconstruction]) -> Kind:
+def kind_at_first(flights: Sequence[Reconstruction], usual: Kind = LATER) -> Kind:
     """The same before anything is known, with the model as it was published.
 
     Gusts of another kind leave more than derivatives that are off by their spread; and taken for strong gusts of this
-    kind, the model settles where no other kind makes sense any more.
+    kind, the model settles where no other kind makes sense any more. `usual`: where nothing is said of it.
     """
     told = [flight for flight in flights if flight.inadequacy.walk <= 1.0]
-    return KINDS[int(np.argmax(np.sum(each(_at_first, told), axis=0)))] if told else LATER
+    return KINDS[int(np.argmax(np.sum(each(_at_first, told), axis=0)))] if told else usual
 
 
 def _at_first(flight: Reconstruction) -> list[float]:
@@ -67,7 +67,7 @@ def _at_first(flight: Reconstruction) -> list[float]:
         best = options[int(np.argmax(scores))]
         if kind == LATER and best.sigma < CALM:
             return [0.0] * len(KINDS)
-        score = max(scores) - _asked(best)
+        score = max(scores) - asked(best)
         out.append(min(score, out[0]) if out and best is options[-1] else score)
     return [score - out[0] for score in out]
 
@@ -86,7 +86,9 @@ def kind_of_gusts(flights: Sequence[Reconstruction], found: Sequence[Gain], push
         pushed: generic discrepancies that the model is flown with, of each record.
     """
     told = [of for of in zip(flights, found, pushed, strict=True) if of[0].inadequacy.walk <= 1.0]
-    return KINDS[int(np.argmax(np.sum(each(_in_favour, *zip(*told, strict=True)), axis=0)))] if told else LATER
+    if not told:
+        return found[0].gusts.kind
+    return KINDS[int(np.argmax(np.sum(each(_in_favour, *zip(*told, strict=True)), axis=0)))]
 
 
 def _in_favour(flight: Reconstruction, found: Gain, pushed: Sequence[Push]) -> list[float]:
@@ -104,17 +106,17 @@ def _in_favour(flight: Reconstruction, found: Gain, pushed: Sequence[Push]) -> l
     out = []
     for kind in KINDS:
         if kind == found.gusts.kind:
-            out.append(-0.5 * _asked(found))
+            out.append(-0.5 * asked(found))
             continue
         gain = gains(flight, (found.sigma,), kind)[0]
         if (gain_of := gained(gain)) > 0.0:
             gain = choose_gain(flight, SIGMAS, pushed, kind)
             gain_of = gained(gain)
-        out.append(min(gain_of, 0.0) if gain.sigma == SIGMAS[-1] and kind != LATER else gain_of - _asked(gain))
+        out.append(min(gain_of, 0.0) if gain.sigma == SIGMAS[-1] and kind != LATER else gain_of - asked(gain))
     return out
 
 
-def _asked(gain: Gain) -> float:
+def asked(gain: Gain) -> float:
     """What the log likelihood of a sample has to gain by gusts of such a kind, half of it to stay with them."""
     if gain.gusts.kind == LATER:
         return 0.0

@@ -1,0 +1,72 @@
+"""Reference flights with the aircraft's own instruments and another loading: neither is a gap afterwards."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from icing_env.aircraft import load
+from icing_env.record import FlightRecord, RecordMeta, read
+from sim2real.baseline.loading import CENTRE, INERTIA, of_another_loading, otherwise_loaded
+from sim2real.baseline.references import Baseline, uncertain
+from sim2real.diagnosis import diagnose
+from sim2real.library.candidates import SPREAD, nuisances
+from testbed.withheld.conditions import Conditions
+from testbed.withheld.files import record_text, side_text
+from testbed.withheld.flights import Aircraft, recorded
+from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
+
+BIASES = {"bias_alpha": 2e-3, "bias_beta": -1.5e-3, "bias_q": 5e-4, "bias_az": 0.03, "bias_theta": 1.5e-3}
+
+
+def flown(folder, role: str, aircraft: Aircraft, seed: int) -> list[FlightRecord]:
+    out = []
+    for i, manoeuvre in enumerate(PLANS[2][:DIAGNOSED]):
+        rng = np.random.default_rng([seed, i])
+        flight, seen = recorded(aircraft, manoeuvre, 1.15, Conditions(0.0, 1.0, 1.0), rng)
+        (folder / f"{role}{i}.csv").write_text(record_text(seen, flight.commands))
+        (folder / f"{role}{i}.toml").write_text(side_text("x", role))
+        out.append(read(folder / f"{role}{i}.csv"))
+    return out
+
+
+def test_offsets_that_all_flights_have_are_no_gap_and_one_beside_them_is(tmp_path):
+    own = Aircraft(terms=BIASES)
+    clean, again = (flown(tmp_path, role, own, seed) for role, seed in (("reference", 1), ("diagnose", 2)))
+    assert diagnose(again, reference=clean).verdict == "no_gap"
+    worse = flown(tmp_path, "diagnose", replace(own, parts=(("alpha_bias", "same", 8e-3),)), 3)
+    found = diagnose(worse, reference=clean)
+    assert found.hypotheses[0]["effects"] == ["alpha_bias"]
+    size = found.effects[0]["parameters"]["offset"]
+    assert size["low95"] - 5e-4 < 8e-3 < size["high95"] + 5e-4
+
+
+def test_without_references_such_offsets_are_a_gap(tmp_path):
+    assert diagnose(flown(tmp_path, "diagnose", Aircraft(terms=BIASES), 2)).verdict != "no_gap"
+
+
+def loaded(mass: float | None, inertia: float = 1.0) -> FlightRecord:
+    moments = None if mass is None else (2e4 * inertia, 3e4, 5e4, 1e3)
+    return FlightRecord({"time": np.zeros(1)}, RecordMeta(mass=mass, inertia=moments))
+
+
+@pytest.mark.parametrize(("one", "other", "otherwise"), [
+    ((4800.0,), (4800.0,), False), ((4800.0,), (4900.0,), True), ((4800.0,), (4803.0, 1.1), False),
+    ((None,), (None,), False), ((4800.0,), (None,), False),
+])  # fmt: skip
+def test_a_loading_is_another_one_where_masses_say_so(one, other, otherwise):
+    assert otherwise_loaded([loaded(*one)], [loaded(*other)]) == otherwise
+
+
+def test_another_loading_leaves_moments_uncertain_and_forces_as_they_were():
+    moves = (*nuisances(), *uncertain())
+    names = [move.name for move in moves]
+    known = Baseline(load(), 1e6 * np.eye(len(moves)), spread=None)
+    sd = dict(zip(names, np.sqrt(np.diag(np.linalg.inv(of_another_loading(known, moves).precision))), strict=True))
+    p = known.parameters[0]
+    moved = CENTRE / p["chord"] * p["CZ_alpha"] / (SPREAD * p["Cm_alpha"])
+    assert sd["Cm_alpha"] == pytest.approx(np.hypot(moved, INERTIA / SPREAD), rel=1e-3)
+    assert sd["Cl_p"] == pytest.approx(INERTIA / SPREAD, rel=1e-3)
+    assert sd["CZ_alpha"] == pytest.approx(1e-3) and sd["bias_alpha"] == pytest.approx(1e-3)
