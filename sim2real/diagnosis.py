@@ -34,6 +34,7 @@ from sim2real.records.instruments import with_recorder
 from sim2real.records.late_power import prompt
 from sim2real.records.reconstruct import Reconstruction, reconstruct
 from sim2real.records.side_by_side import algebra_in_one_thread
+from sim2real.records.vane_lead import met_together
 from sim2real.rollout import Rollout, flying_as
 from sim2real.signatures.evidence import Evidence, typical
 from sim2real.weigh import Progress, fit
@@ -210,7 +211,7 @@ def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, s
     records = with_recorder(records)
     flights = [reconstruct(record) for record in records] if baseline is None else [
         replace(reconstruct(record, baseline.near(record)), inadequacy=baseline.inadequacy) for record in records]
-    flights = in_common([placed(flight) for flight in prompt(in_step(flights))])
+    flights = in_common([placed(flight) for flight in prompt(met_together(in_step(flights)))])
     if simulator is None:
         return flights
     yours = [flying_as(reconstruct(record), simulator) for record in records]

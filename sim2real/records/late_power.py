@@ -50,7 +50,11 @@ def lateness_of_power(flights: Sequence[Reconstruction]) -> tuple[float, float]:
 
 def _left_of(flights: Sequence[Reconstruction], late: float) -> tuple[float, float]:
     """The same of powers that are taken `late` s earlier."""
-    spans = [span for flight in flights for span in _spans(flight, late)]
+    return of_spans([span for flight in flights for span in _spans(flight, late)])
+
+
+def of_spans(spans: Sequence[FloatArray]) -> tuple[float, float]:
+    """What the last column goes with the second by, over the first, and its standard error; infinite where unseen."""
     if not spans:
         return 0.0, np.inf
     k = spans[0].shape[1] - 1
@@ -58,9 +62,9 @@ def _left_of(flights: Sequence[Reconstruction], late: float) -> tuple[float, flo
     x = bread @ sum(s[:, :k].T @ s[:, k] for s in spans)
     each = np.array([s[:, :k].T @ (s[:, k] - s[:, :k] @ x) for s in spans]) @ bread
     error = np.sqrt(np.sum(each**2, axis=0))
-    if not x[0] > CLEAR * error[0]:  # the thrust itself is not seen
+    if not abs(x[0]) > CLEAR * error[0]:
         return 0.0, np.inf
-    return float(x[1] / x[0]), float(error[1] / x[0])
+    return float(x[1] / x[0]), float(error[1] / abs(x[0]))
 
 
 def _spans(flight: Reconstruction, late: float) -> list[FloatArray]:

@@ -1,0 +1,119 @@
+"""Vanes ahead of the aircraft, which meet a gust before its wings do: told by when the accelerations feel it.
+
+On a nose boom x ahead of the centre of gravity a gust shows x/V earlier, while what the aircraft's own motion does to
+the flow shows at once (the rest of it is corrected by rates, `estimators.compatibility.flow_angles`). What moves the
+flow angles beside the motion, which gyros and accelerometers tell, is gust; the normal force lags behind that part of
+alpha by the lead. Least squares as in `late_power`. The flow at the centre of gravity is what the vanes read a lead
+ago, and what the motion has changed since.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+from scipy.signal import lfilter, savgol_filter
+
+from icing_env.atmosphere import G0, density
+from icing_env.record import FloatArray
+from sim2real.records.channels import MEASURED
+from sim2real.records.instruments import lateness
+from sim2real.records.late_power import CLEAR, SPAN, STEPS, of_spans
+from sim2real.records.reconstruct import Reconstruction
+
+SMOOTH = 0.2  # s, over which a parabola through alpha tells how it changes
+LEAST, LONGEST, EDGE = 2.0, 12.0, 0.25  # m: shorter booms are left alone, longer ones are none; s
+NEEDED = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "ax", "ay", "az")
+
+
+def met_together(flights: Sequence[Reconstruction]) -> list[Reconstruction]:
+    """Records with the flow angles that the centre of gravity meets."""
+    boom, error = boom_of_vanes(flights)
+    if not (boom > CLEAR * error and LEAST < boom < LONGEST):
+        return list(flights)
+    return [_later(flight, boom) for flight in flights]
+
+
+def boom_of_vanes(flights: Sequence[Reconstruction]) -> tuple[float, float]:
+    """By how much vanes are ahead in the gusts, and its standard error, m; the error is infinite where nothing tells.
+
+    Beside the lag that they are known to have, by which all that they read is late.
+    """
+    boom, error = 0.0, np.inf
+    for _ in range(STEPS):
+        more, error = of_spans([span for flight in flights for span in _spans(flight, boom)])
+        if not np.isfinite(error):
+            break
+        boom = float(np.clip(boom - more, -LONGEST, LONGEST))
+        if abs(more) < 0.1 * error:
+            break
+    return boom, error
+
+
+def _lead(flight: Reconstruction, boom: float) -> float:
+    """By how much earlier vanes `boom` m ahead show a gust, with their lag beside, s."""
+    return boom / float(np.median(flight.channel("airspeed")))
+
+
+def _spans(flight: Reconstruction, boom: float) -> list[FloatArray]:
+    """Alpha, the way of the air between two of its gusts, what lift goes with beside, the normal force [N, columns]."""
+    length = 2 * round(0.5 * SMOOTH / flight.dt) + 1
+    if length < 5 or not all(flight.has(name) for name in NEEDED):
+        return []
+    late, (own, _) = lateness(float(flight.parameters["vane_lag"][0]), flight.dt), motion(flight)
+    alpha = flight.channel("alpha") - np.cumsum(own) * flight.dt
+    alpha = np.interp(flight.time - _lead(flight, boom) + late, flight.time, alpha) + np.cumsum(own) * flight.dt
+    gusty = (savgol_filter(alpha, length, 2, deriv=1, delta=flight.dt) - own) * _lead(flight, 1.0)
+    V, az, q = (flight.channel(name) for name in ("airspeed", "az", "q"))
+    p, elevator = flight.parameters[0], flight.controls["elevator"]
+    qs = 0.5 * density(float(np.median(flight.altitude))) * V**2 * float(p["wing_area"])
+    columns = np.column_stack([alpha, gusty, alpha**2, q / V, elevator, float(p["mass"]) * az / qs])
+    edge, each = length + round(EDGE / flight.dt), round(SPAN / flight.dt)
+    inside = columns[edge:-edge] - columns[edge:-edge].mean(axis=0)
+    return [inside[i : i + each] for i in range(0, len(inside) - each + 1, each)]
+
+
+def motion(flight: Reconstruction) -> tuple[FloatArray, FloatArray]:
+    """Rates of alpha and beta in air that does not change, rad/s (N,): Klein & Morelli (2006), eqs. 10.3 to 10.5."""
+    V, a, b, p, q, r, phi, theta, ax, ay, az = (flight.channel(name) for name in NEEDED)
+    sa, ca, sb, cb = np.sin(a), np.cos(a), np.sin(b), np.cos(b)
+    x, y, z = (ax - G0 * np.sin(theta), ay + G0 * np.cos(theta) * np.sin(phi), az + G0 * np.cos(theta) * np.cos(phi))
+    along = x * ca * cb + y * sb + z * sa * cb
+    return (q - (p * ca + r * sa) * sb / cb + (z * ca - x * sa) / (V * cb),
+            p * sa - r * ca + (y - along * sb) / (V * cb))
+
+
+def _at_centre(flight: Reconstruction, lead: float) -> tuple[dict[str, FloatArray], float]:
+    """Flow angles of some samples ago and what the motion has changed since, and by how much more they are late, s.
+
+    Whole samples, lest noise between two of them is less than at them; what is left of the last one is a vane's lag.
+    """
+    samples = int(np.ceil(lead / flight.dt - 1e-9))
+    more, lag = samples * flight.dt - lead, float(flight.parameters["vane_lag"][0])
+    out = {}
+    for name, own in zip(("alpha", "beta"), motion(flight), strict=True):
+        turned = cumulative_trapezoid(own, dx=flight.dt, initial=0.0)
+        air = flight.channel(name) - _behind(turned, lag, flight.dt)
+        before = np.clip(np.arange(len(air)) - samples, 0, len(air) - 1)
+        out[name] = air[before] + _behind(turned, lag + more, flight.dt)
+    return out, more
+
+
+def _behind(angle: FloatArray, lag: float, dt: float) -> FloatArray:
+    """An angle behind a lag of first order."""
+    share = -np.expm1(-dt / lag) if lag > 0.0 else 1.0
+    return np.asarray(lfilter([share], [1.0, share - 1.0], angle))
+
+
+def _later(flight: Reconstruction, boom: float) -> Reconstruction:
+    """The record with flow angles at the centre of gravity, none where it had none."""
+    measured, row = flight.measured.copy(), flight.parameters.copy()
+    angles, more = _at_centre(flight, _lead(flight, boom))
+    for name, angle in angles.items():
+        column = MEASURED.index(name)
+        measured[:, column] = np.where(np.isfinite(measured[:, column]), angle, np.nan)
+    row["vane_lag"] = row["vane_lag"] + more
+    return replace(flight, measured=measured, parameters=row, notes=(
+        *flight.notes, f"vanes meet gusts {boom:.1f} m before the wings: taken at the centre of gravity"))

@@ -1,0 +1,89 @@
+"""Vanes on a boom meet a gust before the wings: told by when the accelerations feel it, and taken out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from icing_env.record import read
+from sim2real.diagnosis import _reconstructed, diagnose
+from sim2real.records.channels import MEASURED
+from sim2real.records.reconstruct import Reconstruction, reconstruct
+from sim2real.records.vane_lead import boom_of_vanes, motion
+from testbed.withheld import instruments
+from testbed.withheld import plant as pl
+from testbed.withheld.conditions import Conditions
+from testbed.withheld.files import record_text, side_text
+from testbed.withheld.flights import Aircraft, fly, turbulence
+from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
+from testbed.withheld.published import PUBLISHED
+
+BOOM = 5.6  # m
+
+
+def flown(folder, sigma: float, boom: float, count: int = DIAGNOSED) -> list:
+    """Records of the generator's plant, its vanes `boom` m ahead of the centre of gravity in the gusts."""
+    out = []
+    for i, manoeuvre in enumerate(PLANS[2][:count]):
+        rng = np.random.default_rng([7, i])
+        gust = turbulence(manoeuvre, Conditions(sigma, 1.0, 1.0, "at_once"), rng)
+        flight, ahead = fly(Aircraft(), manoeuvre, 1.0, gust), round(boom / manoeuvre.speed * pl.SUB / pl.DT)
+        channels = dict(flight.channels)
+        for name, column in (("alpha", pl.G_W), ("beta", pl.G_V)):
+            now = gust[:: pl.SUB, column]
+            there = np.append(gust[ahead:, column], np.repeat(gust[-1, column], ahead))[:: pl.SUB]
+            channels[name] = channels[name] + late((now - there) / manoeuvre.speed)
+        seen = instruments.read(channels, 1.0, rng)
+        (folder / f"{i}.csv").write_text(record_text(seen, flight.commands))
+        (folder / f"{i}.toml").write_text(side_text("x", "diagnose"))
+        out.append(read(folder / f"{i}.csv"))
+    return out
+
+
+def late(angle: np.ndarray) -> np.ndarray:
+    """As the vane and the recorder show it."""
+    cut = 1.0 / (2.0 * np.pi * PUBLISHED["filter_frequency"])
+    for share in (instruments.gain(PUBLISHED["vane_lag"]), instruments.gain(cut)):
+        angle = lfilter([share], [1.0, share - 1.0], angle)
+    return np.asarray(angle)
+
+
+def noted(flights: list[Reconstruction]) -> bool:
+    return all(any("before the wings" in note for note in flight.notes) for flight in flights)
+
+
+@pytest.mark.parametrize("sigma", [0.5, 1.5])
+def test_the_boom_is_told_and_taken_out(tmp_path, sigma):
+    records = flown(tmp_path, sigma, BOOM)
+    boom, error = boom_of_vanes([reconstruct(record) for record in records])
+    assert boom == pytest.approx(BOOM, abs=1.0) and error < 0.3
+    assert noted(_reconstructed(records, None, None))
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.5, 1.5])
+def test_vanes_at_the_centre_of_gravity_are_left_alone(tmp_path, sigma):
+    assert not noted(_reconstructed(flown(tmp_path, sigma, 0.0), None, None))
+
+
+def test_in_still_air_the_motion_is_all_that_moves_the_flow(tmp_path):
+    (record,) = flown(tmp_path, 0.0, 0.0, 1)
+    flight = reconstruct(record)
+    for name, rate in zip(("alpha", "beta"), motion(flight), strict=True):
+        angle, made = flight.channel(name), np.cumsum(rate) * flight.dt
+        left = angle - made
+        trend = np.polyval(np.polyfit(flight.time, left, 3), flight.time)
+        assert np.std(left - trend) < 0.25 * np.std(angle), name
+
+
+def test_flow_angles_that_were_not_sampled_stay_so(tmp_path):
+    records = flown(tmp_path, 1.5, BOOM)
+    records[0].channels["alpha"][100:120] = np.nan
+    flights = _reconstructed(records, None, None)
+    assert noted(flights)
+    assert np.isnan(flights[0].measured[100:120, MEASURED.index("alpha")]).all()
+
+
+def test_a_clean_aircraft_with_a_boom_is_not_blamed(tmp_path):
+    """Its gusts were of no kind that made sense, and what they did was a vane's, a damping's or unknown."""
+    assert diagnose(flown(tmp_path, 1.5, BOOM)).verdict == "no_gap"
