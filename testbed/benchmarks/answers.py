@@ -60,6 +60,18 @@ def diagnosis_of(records: Sequence[FlightRecord], held_out: Sequence[FlightRecor
     return told
 
 
+def solve_by_role(case: Path) -> dict[str, Any]:
+    """The diagnosis of a folder of records, each taken as its side file says; {"error": why} where there is none."""
+    from icing_env.record import read
+
+    def work() -> dict[str, Any]:
+        records = [read(path) for path in sorted(case.glob("*.csv"))]
+        of = {role: [r for r in records if r.meta.role == role] for role in ("diagnose", "held_out", "reference")}
+        return diagnosis_of(of["diagnose"], of["held_out"], of["reference"])
+
+    return answered(work)
+
+
 def answered(work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
     """One case's answer; where a record is refused or `work` fails, why: it must not cost other cases their answers.
 

@@ -61,8 +61,14 @@ def _truth(key: dict[str, Any]) -> str:
 
 
 def _told(answer: dict[str, Any]) -> str:
+    said, probability = leading(answer)
+    return said if probability is None else f"{said}, {probability:.2f}"
+
+
+def leading(answer: dict[str, Any]) -> tuple[str, float | None]:
+    """The most probable explanation in words, and its probability; of a refusal why, and None."""
     if "error" in answer:
-        return f"refused: {answer['error']}"
+        return f"refused: {answer['error']}", None
     first = max(answer["hypotheses"], key=lambda h: h["probability"])
     names = [*first["effects"], *(["something unknown"] if first["unknown"] else [])]
-    return f"{' + '.join(names) or 'no gap'}, {first['probability']:.2f}"
+    return " + ".join(names) or "no gap", first["probability"]

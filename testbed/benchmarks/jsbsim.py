@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from icing_env.errors import InputError
-from testbed.benchmarks.answers import OPEN, Progress, answer_all, answered, diagnosis_of
+from testbed.benchmarks.answers import OPEN, Progress, answer_all, solve_by_role
 from testbed.withheld.files import read_json, write_text
 from testbed.withheld.jsbsim_cases import Design, designs, write_case
 from testbed.withheld.jsbsim_edit import data_root
@@ -45,7 +45,7 @@ def measure(out: Path, cases: int | None, seed: int, workers: int, root: str | N
         raise InputError(f"{where}: pip install jsbsim, or name a JSBSim tree by --jsbsim-root or JSBSIM_ROOT")
     drawn = designs(cases or CASES, seed)
     _fly(out, drawn, seed, found, workers, progress)
-    answer_all(out, "answers", {design.name: () for design in drawn}, workers, progress, solve)
+    answer_all(out, "answers", {design.name: () for design in drawn}, workers, progress, solve_by_role)
     progress("scoring")
     apart = differences(found)
     result = score(out / "answers", out / "keys", differing(apart))
@@ -67,18 +67,6 @@ def _fly(out: Path, drawn: list[Design], seed: int, root: Path, workers: int, pr
         for k, task in enumerate(as_completed(running), start=1):
             task.result()
             progress(f"flown {k} of {len(drawn)}")
-
-
-def solve(case: Path) -> dict[str, Any]:
-    """The diagnosis of one case, as `icing diagnose --json` prints it; {"error": why} where there is none."""
-    from icing_env.record import read
-
-    def work() -> dict[str, Any]:
-        records = [read(path) for path in sorted(case.glob("*.csv"))]
-        of = {role: [r for r in records if r.meta.role == role] for role in ("diagnose", "held_out", "reference")}
-        return diagnosis_of(of["diagnose"], of["held_out"], of["reference"])
-
-    return answered(work)
 
 
 def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[str]]]]:

@@ -1,7 +1,8 @@
 """`icing benchmark`: how fast (`speed`), how well ice (`characterisation`) and gaps (`diagnosis`) are told.
 
 `protection`, `adaptation`: what they are worth; `policies`: what a gap does to a choice between controllers;
-`real_flight`: recorded flights diagnosed; `recordings`: the same flights as other recorders would have them.
+`real_flight`: recorded flights diagnosed; `recordings`: the same flights as other recorders would have them;
+`elsewhere`: flights of a plant made elsewhere.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from icing_env.errors import InputError, nearest
 from testbed.commands.common import print_json, print_table, verb
 
 NAMES = ("speed", "characterisation", "protection", "adaptation", "diagnosis", "real_flight",
-         "policies", "recordings")
+         "policies", "recordings", "elsewhere")
 GUSTS = ("later", "turning", "at_once", "rolling", "mixed")
 EXAMPLE = """icing benchmark speed --json
 icing benchmark characterisation --quick --figure out/reliability.png
@@ -36,10 +37,10 @@ icing benchmark diagnosis --jsbsim"""
               help="of these only, named as the tables name them. protection: rows; real_flight, policies: cases; "
                    "recordings: recorders.")
 @click.option("--cases", type=click.IntRange(min=8),
-              help="how many. diagnosis: 2400 if omitted, 150 with --quick; recordings: 24, 8.")
+              help="how many. diagnosis: 2400 if omitted, 150 with --quick; recordings: 24, 8; elsewhere: 12.")
 @click.option("--fresh-seed", is_flag=True, help="diagnosis: a sealed set, its seed from the operating system.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/withheld"),
-              show_default=True, help="records, keys, answers of diagnosis, recordings; an interrupted run goes on.")
+              show_default=True, help="diagnosis, recordings, elsewhere: what was drawn and answered; a run goes on.")
 @click.option("--pool", multiple=True, type=click.Path(path_type=Path),
               help="diagnosis: draw and solve nothing, score these sets together: --out folders or --publish files.")
 @click.option("--publish", type=click.Path(path_type=Path, dir_okay=False),
@@ -56,7 +57,7 @@ icing benchmark diagnosis --jsbsim"""
 @click.option("--gusts", type=click.Choice(GUSTS), default="later", show_default=True,
               help="diagnosis: how they differ along the aircraft; mixed: each kind in turn.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True,
-              help="diagnosis, recordings: processes.")
+              help="diagnosis, recordings, elsewhere: processes.")
 def command(name: str, quick: bool, weights: Path | None, figure: Path | None, encounters: int | None,
             only: str | None, cases: int | None, fresh_seed: bool, out: Path, ledger: Path | None, workers: int,
             without: bool, rivals: bool, strangers: bool, spread: float, gusts: str, pool: tuple[Path, ...],
@@ -71,9 +72,11 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
     against the clean aircraft's. `diagnosis`: gaps drawn and flown by a plant of the benchmark's own, half of them in
     another form than the library's, some in no library; the solver does not see the keys. 2400 cases take some six
     hours on two cores. `recordings`: some of these flights as other recorders would have them, slower, on fewer
-    levels, with holes, in part. `real_flight`: NASA's recorded flights (ICING_FLIGHT_DATA) and the founding paper's own
-    gap. `policies`: which ranking of controllers a gap turns round, before the diagnosis and after. Seeds are fixed in
-    the code, apart from those of the training; --seed changes nothing but the sets of `diagnosis` and `recordings`.
+    levels, with holes, in part. `elsewhere`: clean aircraft and gaps of a second plant, of which nothing but where they
+    enter and how far they close is scored. `real_flight`: NASA's recorded flights (ICING_FLIGHT_DATA) and the founding
+    paper's own gap. `policies`: which ranking of controllers a gap turns round, before the diagnosis and after. Seeds
+    are fixed in the code, apart from those of the training; --seed changes nothing but the sets of `diagnosis`,
+    `recordings` and `elsewhere`.
     """
     if name == "speed":
         _speed(as_json)
@@ -108,6 +111,9 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
     if name == "recordings":
         _recordings(cases or (8 if quick else None), only, seed, out / "recordings", workers, as_json)
         return
+    if name == "elsewhere":
+        _elsewhere(cases, seed, out / "elsewhere", workers, as_json)
+        return
     from testbed.characterisation.benchmark import draw, measure, tables
 
     found = measure(quick, weights, lambda what: click.echo(f"{what} ...", err=True))
@@ -135,6 +141,13 @@ def _recordings(cases: int | None, only: str | None, seed: int, out: Path, worke
     from testbed.benchmarks.recordings import measure, tables
 
     found = measure(out, cases, seed, workers, _listed(only), lambda what: click.echo(what, err=True))
+    _show(found, tables(found), as_json)
+
+
+def _elsewhere(cases: int | None, seed: int, out: Path, workers: int, as_json: bool) -> None:
+    from testbed.benchmarks.elsewhere import measure, tables
+
+    found = measure(out, cases, seed, workers, lambda what: click.echo(what, err=True))
     _show(found, tables(found), as_json)
 
 
