@@ -30,10 +30,10 @@ WALKS = (1.0, 3.0, 10.0, 30.0, 100.0)  # times `kalman.WALK`
 OF_REFERENCES = WALKS[:-1]  # more of it would pass for gusts, or gusts for it
 
 
-def walk(flights: Sequence[Reconstruction]) -> tuple[float, Kind]:
-    """The likeliest of OF_REFERENCES, and kind of gusts, whatever the intensity in each flight."""
+def walk(flights: Sequence[Reconstruction], kinds: Sequence[Kind] = KINDS) -> tuple[float, Kind]:
+    """The likeliest of OF_REFERENCES, and of some kinds of gusts, whatever the intensity in each flight."""
     scores = {(times, kind): sum(_likely(replace(f, inadequacy=replace(f.inadequacy, walk=times)), kind)
-                                 for f in flights) for times in OF_REFERENCES for kind in KINDS}  # fmt: skip
+                                 for f in flights) for times in OF_REFERENCES for kind in kinds}  # fmt: skip
     return max(scores, key=lambda of: scores[of])
 
 

@@ -19,7 +19,7 @@ from icing_env import aircraft
 from icing_env.record import FlightRecord, FloatArray
 from sim2real.baseline.inadequacy import WALKS, clean, colour, walk
 from sim2real.library.candidates import NUISANCE_STEP, Bank, Nuisance
-from sim2real.prediction.gusts import LATER, Kind
+from sim2real.prediction.gusts import KINDS, LATER, Kind
 from sim2real.prediction.kalman import follow
 from sim2real.records.channels import SURFACES
 from sim2real.records.reconstruct import Inadequacy, Reconstruction
@@ -128,8 +128,9 @@ def uncertain() -> tuple[Nuisance, ...]:
 
 def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank) -> Baseline:
     """The model corrected by reference flights, and the precision with which they leave it."""
-    fit = Fit(flights, directions(candidates), np.array([_condition(float(np.median(f.channel("airspeed"))))
-                                                         for f in flights]))  # fmt: skip
+    moves, at = directions(candidates), np.array([_condition(float(np.median(f.channel("airspeed")))) for f in flights])
+    fit = Fit(flights, moves, at)
+    fit.spread[: len(moves)] = [WEAK.get(move.name, 1.0) for move in moves]
     fit.run()
     return fit.baseline(candidates)
 
@@ -140,15 +141,21 @@ class Fit:
     x: the numbers' values, then their changes [2 n], in `moves`' units; precision: of x; walk: of `Inadequacy`.
     """
 
-    def __init__(self, flights: Sequence[Reconstruction], moves: Sequence[Nuisance], at: FloatArray) -> None:
-        """Begin with the model as it is; `at`: condition that changes go with [flights], zeros for none."""
+    def __init__(self, flights: Sequence[Reconstruction], moves: Sequence[Nuisance], at: FloatArray,
+                 kinds: Sequence[Kind] = KINDS) -> None:
+        """Begin with the model as it is.
+
+        Args:
+            at: condition that changes go with [flights], zeros for none.
+            kinds: of gusts, of which the likeliest is taken.
+        """
+        self.kinds = kinds
         n = len(moves)
         self.flights, self.moves, self.at = flights, moves, at
         self.bank = Bank(tuple(moves), (), (), 1 + n)
         changing = [STEADY if move.name in INSTRUMENTS else CHANGES for move in moves]
-        values = [WEAK.get(move.name, 1.0) for move in moves]
         self.widest = np.tile([1.0 if move.name in INSTRUMENTS else np.inf for move in moves], 2)
-        self.x, self.spread = np.zeros(2 * n), np.concatenate([values, changing])
+        self.x, self.spread = np.zeros(2 * n), np.concatenate([np.ones(n), changing])
         self.walk, self.kind = WALKS[-1], LATER  # while the model may still be far off
         self.precision = np.zeros((0, 0))
         self.evidences: list[Evidence] = []
@@ -158,7 +165,7 @@ class Fit:
         for k in range(ROUNDS):
             settled = self.step(again=k > AGAIN) < SETTLED
             if k == AGAIN or (k > AGAIN and settled):
-                last, (self.walk, self.kind) = self.walk, walk(self.flown())
+                last, (self.walk, self.kind) = self.walk, walk(self.flown(), self.kinds)
                 if k > AGAIN and self.walk == last:
                     break
 

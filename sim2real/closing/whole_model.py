@@ -19,7 +19,7 @@ from scipy.stats import chi2
 from icing_env import effects
 from icing_env.effects.discrepancy import TERMS
 from icing_env.record import FloatArray
-from sim2real.baseline.references import Fit, directions
+from sim2real.baseline.references import INSTRUMENTS, Fit, directions
 from sim2real.closing import gap
 from sim2real.closing.black_box import FELT, PUSHED, residual_accelerations
 from sim2real.closing.remedy import Remedy, Values
@@ -30,6 +30,7 @@ from sim2real.posterior.generic import UnknownFit
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
 from sim2real.posterior.sets import SetFit
 from sim2real.posterior.widened import SIZES
+from sim2real.prediction.gusts import LATER
 from sim2real.records.channels import TOLERANCE
 from sim2real.records.reconstruct import Reconstruction
 
@@ -134,7 +135,8 @@ def fit_whole_model(flights: Sequence[Reconstruction], candidates: Bank, posteri
         posterior: of the explanations tried before.
     """
     numbers = _numbers(flights[0], candidates, posterior)
-    fit = Fit(flights, [n.move for n in numbers], at=np.zeros(len(flights)))
+    # what the model lacks here passes for gusts of another kind
+    fit = Fit(flights, [n.move for n in numbers], np.zeros(len(flights)), (LATER,))
     fit.run()
     x, count = fit.x[: len(numbers)], len(numbers)
     unit = np.array([n.move.factor / n.per for n in numbers])
@@ -161,7 +163,7 @@ def _numbers(flight: Reconstruction, candidates: Bank, posterior: Posterior) -> 
              and (per := _per_unit(flight, f)) is not None}  # fmt: skip
     out = []
     for move in directions(candidates):
-        if move.only or move.parameter.startswith("scale_"):
+        if move.only or move.name in INSTRUMENTS:
             continue
         coefficient, _, term = move.parameter.partition("_")
         if (found := alone.get(frozenset(move.parameter.split("+")))) is not None:
