@@ -24,6 +24,7 @@ CALM = 0.1  # m/s, below which no kind of gusts is told
 # Of log likelihood a sample: the least that speaks for air that turns, or that meets all of the aircraft at once, and
 # half of what it is per (m/s)^2 (our simulator at 0.25 to 1.5 m/s: 15 to 25, and 2 to 3); m/s beyond which no more
 TURNING, AT_ONCE, MOST = (0.3, 8.0), (0.05, 1.0), 1.5
+STRAIGHT = [kind for kind in KINDS if not kind.rotation]  # LATER first
 TOGETHER = 100  # samples that the channels have to share for their covariance to be judged
 
 
@@ -52,21 +53,22 @@ def kind_at_first(flights: Sequence[Reconstruction], usual: Kind = LATER) -> Kin
     """The same before anything is known, with the model as it was published.
 
     Gusts of another kind leave more than derivatives that are off by their spread; and taken for strong gusts of this
-    kind, the model settles where no other kind makes sense any more. `usual`: where nothing is said of it.
+    kind, the model settles where no other kind makes sense any more. Whether the air turns is not asked yet: a gap in
+    roll makes more of it than any spread. `usual`: where nothing is said of it.
     """
     told = [flight for flight in flights if flight.inadequacy.walk <= 1.0]
-    return KINDS[int(np.argmax(np.sum(each(_at_first, told), axis=0)))] if told else usual
+    return STRAIGHT[int(np.argmax(np.sum(each(_at_first, told), axis=0)))] if told else usual
 
 
 def _at_first(flight: Reconstruction) -> list[float]:
     """Log likelihood of a sample by kind of gusts beyond that of LATER, less what is asked; else as `_in_favour`."""
     out = list[float]()
-    for kind in KINDS:
+    for kind in STRAIGHT:
         options = gains(flight, SIGMAS[::2], kind)
         scores = likelihoods(flight, options)
         best = options[int(np.argmax(scores))]
         if kind == LATER and best.sigma < CALM:
-            return [0.0] * len(KINDS)
+            return [0.0] * len(STRAIGHT)
         score = max(scores) - asked(best)
         out.append(min(score, out[0]) if out and best is options[-1] else score)
     return [score - out[0] for score in out]
