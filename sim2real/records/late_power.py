@@ -8,7 +8,7 @@ errors are those of spans that count as one each (Liang & Zeger's sandwich, Biom
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,22 +35,27 @@ def prompt(flights: Sequence[Reconstruction]) -> list[Reconstruction]:
 
 
 def lateness_of_power(flights: Sequence[Reconstruction]) -> tuple[float, float]:
-    """By how much recorded powers are late, and its standard error, s; the error is infinite where nothing tells.
+    """By how much recorded powers are late, and its standard error, s; the error is infinite where nothing tells."""
+    return until_none_is_left(flights, _spans, LONGEST)
 
-    Found again with the powers so much earlier until nothing is left: a rate told from samples is too small.
+
+def until_none_is_left(flights: Sequence[Reconstruction], spans: Callable[[Reconstruction, float], list[FloatArray]],
+                       longest: float) -> tuple[float, float]:  # fmt: skip
+    """What `of_spans` finds, found again with so much taken out until nothing is left, and its standard error.
+
+    A rate told from samples is too small, so that once is not enough.
+
+    Args:
+        spans: of a record from which so much was taken out.
+        longest: that it may be, either way.
     """
-    late, error = 0.0, np.inf
+    found, error = 0.0, np.inf
     for _ in range(STEPS):
-        more, error = _left_of(flights, late)
-        late = float(np.clip(late + more, -LONGEST, LONGEST))
+        more, error = of_spans([span for flight in flights for span in spans(flight, found)])
+        found = float(np.clip(found + more, -longest, longest))
         if abs(more) < 0.1 * error or not np.isfinite(error):
             break
-    return late, error
-
-
-def _left_of(flights: Sequence[Reconstruction], late: float) -> tuple[float, float]:
-    """The same of powers that are taken `late` s earlier."""
-    return of_spans([span for flight in flights for span in _spans(flight, late)])
+    return found, error
 
 
 def of_spans(spans: Sequence[FloatArray]) -> tuple[float, float]:

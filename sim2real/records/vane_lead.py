@@ -20,7 +20,7 @@ from icing_env.atmosphere import G0, density
 from icing_env.record import FloatArray
 from sim2real.records.channels import MEASURED
 from sim2real.records.instruments import lateness
-from sim2real.records.late_power import CLEAR, SPAN, STEPS, of_spans
+from sim2real.records.late_power import CLEAR, SPAN, until_none_is_left
 from sim2real.records.reconstruct import Reconstruction
 
 SMOOTH = 0.2  # s, over which a parabola through alpha tells how it changes
@@ -41,24 +41,16 @@ def boom_of_vanes(flights: Sequence[Reconstruction]) -> tuple[float, float]:
 
     Beside the lag that they are known to have, by which all that they read is late.
     """
-    boom, error = 0.0, np.inf
-    for _ in range(STEPS):
-        more, error = of_spans([span for flight in flights for span in _spans(flight, boom)])
-        if not np.isfinite(error):
-            break
-        boom = float(np.clip(boom - more, -LONGEST, LONGEST))
-        if abs(more) < 0.1 * error:
-            break
-    return boom, error
+    return until_none_is_left(flights, _spans, LONGEST)
 
 
 def _lead(flight: Reconstruction, boom: float) -> float:
-    """By how much earlier vanes `boom` m ahead show a gust, with their lag beside, s."""
+    """By how much earlier vanes `boom` m ahead meet a gust, s."""
     return boom / float(np.median(flight.channel("airspeed")))
 
 
 def _spans(flight: Reconstruction, boom: float) -> list[FloatArray]:
-    """Alpha, the way of the air between two of its gusts, what lift goes with beside, the normal force [N, columns]."""
+    """Alpha, how its gusts lessen a metre on, what lift goes with beside, the normal force [samples, columns]."""
     length = 2 * round(0.5 * SMOOTH / flight.dt) + 1
     if length < 5 or not all(flight.has(name) for name in NEEDED):
         return []
@@ -69,7 +61,7 @@ def _spans(flight: Reconstruction, boom: float) -> list[FloatArray]:
     V, az, q = (flight.channel(name) for name in ("airspeed", "az", "q"))
     p, elevator = flight.parameters[0], flight.controls["elevator"]
     qs = 0.5 * density(float(np.median(flight.altitude))) * V**2 * float(p["wing_area"])
-    columns = np.column_stack([alpha, gusty, alpha**2, q / V, elevator, float(p["mass"]) * az / qs])
+    columns = np.column_stack([alpha, -gusty, alpha**2, q / V, elevator, float(p["mass"]) * az / qs])
     edge, each = length + round(EDGE / flight.dt), round(SPAN / flight.dt)
     inside = columns[edge:-edge] - columns[edge:-edge].mean(axis=0)
     return [inside[i : i + each] for i in range(0, len(inside) - each + 1, each)]
