@@ -218,7 +218,8 @@ def _sensors(p: Any, dt: float) -> dict[str, Any]:
     """
     lags = {"alpha": p["vane_lag"], "beta": p["vane_lag"], "airspeed": p["pitot_lag"],
             "filter": 1.0/(2.0*np.pi*p["filter_frequency"])}
-    known = {name: {"lag": float(dt/np.expm1(dt/max(lag, 1e-4)))} for name, lag in lags.items()}
+    known: dict[str, Any] = {name: {"lag": float(dt/np.expm1(dt/max(lag, 1e-4)))} for name, lag in lags.items()}
+    known["thrust"] = {"source": "measured"}  # true, but for noise and a scale (icing_env.sensors)
     known["alpha"]["bending"] = float(p["boom_gain"])
     return known
 

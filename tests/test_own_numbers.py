@@ -81,7 +81,8 @@ def test_the_numbers_are_told_with_errors_that_hold_the_truth(found):
     assert set(told) == set(NUMBERS)
     off = [(one["change"] - OFF.get(name, 0.0)) / one["std_error"] for name, one in told.items()]
     assert np.sqrt(np.mean(np.square(off))) < 1.8
-    assert all(0.0 < one["std_error"] < 1.1 * OWN_NUMBERS * 0.05 for one in told.values())
+    spread = {move.name: move.factor for move in nuisances()}
+    assert all(0.0 < one["std_error"] < 1.1 * OWN_NUMBERS * spread[name] for name, one in told.items())
 
 
 def test_the_command_flies_what_was_diagnosed(found):

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from icing_env import aircraft, scenario
+from icing_env.errors import InputError
 from icing_env.record import FlightRecord
 from sim2real.diagnosis import diagnose
 from sim2real.library.candidates import bank, not_testable
@@ -44,6 +45,42 @@ def test_powers_are_those_of_the_torque_whatever_they_are_told_by(absent, source
         power, told = true.controls[f"power_{side}"], flight.controls[f"power_{side}"]
         assert np.sqrt(np.mean((told - power) ** 2)) < within * np.mean(power)
     assert any("not recorded" in note for note in flight.notes)
+
+
+def by_another_chart(source: str | None) -> FlightRecord:
+    """A record whose owner's propeller pulls a fifth more at the same torque, and more so at low speed."""
+    record = flown(0.5)
+    share = 1.2 - 0.004 * (record["airspeed"] - np.nanmean(record["airspeed"]))
+    sensors = {name: value for name, value in record.meta.sensors.items() if name != "thrust"}
+    told = {} if source is None else {"thrust": {"source": source}}
+    return replace(record, meta=replace(record.meta, sensors=sensors | told),
+                   channels=record.channels | {f"torque_{s}": record[f"torque_{s}"] / share for s in ("left", "right")})
+
+
+@pytest.mark.parametrize("source", [None, "computed"])
+def test_thrust_that_its_owner_computed_drives_the_model_whatever_the_published_chart_makes_of_torque(source):
+    flight = reconstruct(by_another_chart(source))
+    record, per_power = flight.record, thrust_per_power(flight.parameters[0], flight.channel("airspeed"),
+                                                        flight.channel("alpha"))
+    assert flight.power_from == "thrust" and flight.shaft_powers
+    recorded = np.isfinite(record["thrust_left"])
+    there = np.interp(record.time[recorded] - record.time[0], flight.time, flight.controls["power_left"] * per_power)
+    off = there / record["thrust_left"][recorded] - 1.0  # noise of 15 N and of airspeed, of which power has none
+    assert abs(np.mean(off)) < 1e-3 and np.std(off) < 0.01
+    assert any("1.20 of what the published chart makes of torque" in note for note in flight.notes)
+    assert "spool_lag" not in not_testable([flight], bank())
+    assert diagnose([record]).verdict == "no_gap"
+
+
+def test_thrust_that_was_measured_is_compared_with_what_the_torque_makes():
+    flight = reconstruct(by_another_chart("measured"))
+    assert flight.power_from == "torque" and flight.has("thrust_left")
+    assert "thrust_loss" in diagnose([flight.record]).hypotheses[0]["effects"]
+
+
+def test_the_source_of_thrust_is_one_of_two_words():
+    with pytest.raises(InputError, match="must be measured or computed, got 'guessed'"):
+        reconstruct(by_another_chart("guessed"))
 
 
 def test_a_lever_that_steps_moves_the_power_through_the_spool():

@@ -12,7 +12,7 @@ from icing_env.record import FlightRecord, RecordMeta, read
 from sim2real.baseline.loading import CENTRE, INERTIA, of_another_loading, otherwise_loaded
 from sim2real.baseline.references import Baseline, uncertain
 from sim2real.diagnosis import diagnose
-from sim2real.library.candidates import SPREAD, nuisances
+from sim2real.library.candidates import SPREAD, TOLD_ONCE, nuisances
 from testbed.withheld.conditions import Conditions
 from testbed.withheld.files import record_text, side_text
 from testbed.withheld.flights import Aircraft, recorded
@@ -43,8 +43,17 @@ def test_offsets_that_all_flights_have_are_no_gap_and_one_beside_them_is(tmp_pat
     assert size["low95"] - 5e-4 < 8e-3 < size["high95"] + 5e-4
 
 
-def test_without_references_such_offsets_are_a_gap(tmp_path):
-    assert diagnose(flown(tmp_path, "diagnose", Aircraft(terms=BIASES), 2)).verdict != "no_gap"
+@pytest.mark.parametrize(("times", "gap"), [(1.0, False), (4.0, True)])
+def test_without_references_offsets_beyond_a_calibration_are_a_gap(tmp_path, times, gap):
+    own = Aircraft(terms={name: times * offset for name, offset in BIASES.items()})
+    assert (diagnose(flown(tmp_path, "diagnose", own, 2)).verdict != "no_gap") == gap
+
+
+@pytest.mark.parametrize("number", TOLD_ONCE)
+def test_a_number_that_one_source_tells_may_be_another_without_a_gap(tmp_path, number):
+    within, beyond = (Aircraft(baseline={number: 1.0 + times * TOLD_ONCE[number]}) for times in (-1.2, -8.0))
+    assert diagnose(flown(tmp_path, "diagnose", within, 4)).verdict == "no_gap"
+    assert diagnose(flown(tmp_path, "diagnose", beyond, 4)).verdict != "no_gap"
 
 
 def loaded(mass: float | None, inertia: float = 1.0) -> FlightRecord:

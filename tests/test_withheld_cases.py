@@ -198,6 +198,25 @@ def test_derivatives_of_another_spread_are_off_by_as_many_deviations():
         assert wide.baseline[name] - 1.0 == pytest.approx(2.0 * (case.baseline[name] - 1.0))
 
 
+def test_aircraft_of_a_calibrated_set_are_as_before_but_for_what_nobody_knows_better():
+    usual = draw.USUAL.placed(draw.designs(40, 3), 3)
+    today = draw.Population(calibrated=True).placed(draw.designs(40, 3), 3)
+    own = {**draw.TOLD_ONCE, **draw.CALIBRATION}
+    for before, now in zip(usual, today, strict=True):
+        assert set(now.baseline) - set(before.baseline) == set(own)
+        assert replace(now, baseline=before.baseline, parts=before.parts) == before
+        times = [draw.LARGER_STILL.get(name, 1.0) for name, _, _ in now.parts]
+        assert [size for *_, size in now.parts] == [t * s for t, (*_, s) in zip(times, before.parts, strict=True)]
+        assert {name: now.baseline[name] for name in before.baseline} == before.baseline
+    for name, size in own.items():
+        off = [case.baseline[name] - (name in draw.TOLD_ONCE) for case in today]
+        assert 0.6 * size < np.std(off) < 1.5 * size and abs(np.mean(off)) < 0.6 * size
+    at = flights.Aircraft(today[0].baseline)
+    assert at.instruments() == {name: today[0].baseline[name] for name in draw.CALIBRATION}
+    assert at.row()["engine_arm_z"] == flights.Aircraft().row()["engine_arm_z"] * today[0].baseline["engine_arm_z"]
+    assert draw.Population(calibrated=True).told() == {"calibrated": True}
+
+
 def test_a_set_of_another_spread_says_so(tmp_path, only_nulls):
     sealed = generate.generate(tmp_path, 3, 11, population=draw.Population(spread=0.08))
     assert sealed["spread"] == 0.08 and kind_of(sealed) == "development spread 0.08"

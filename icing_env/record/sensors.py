@@ -15,6 +15,7 @@ WORDS: dict[str, tuple[str, ...]] = {
     "airspeed": ("lag", "source"),
     "accelerometers": ("position", "corrected"),
     "filter": ("lag", "frequency", "found"),
+    "thrust": ("source",),
 }
 ENTRIES = {"accelerometer": ("accelerometers",), "vane": ("alpha", "beta"), "vanes": ("alpha", "beta"),
            "pitot": ("airspeed",), "recorder": ("filter",)}  # fmt: skip

@@ -239,7 +239,7 @@ def driven(flight: Reconstruction, parameters: NDArray, paths: Collection[str]) 
 
 
 def _engine_residuals(flight: Reconstruction, parameters: NDArray) -> list[tuple[str, FloatArray, list[int]]]:
-    if flight.power_from != "torque":
+    if not flight.shaft_powers:
         return []
     rows = _differing(parameters, ["spool_time"])
     lags = parameters["spool_time"][rows]
@@ -265,8 +265,10 @@ def _engines_left(flight: Reconstruction, lags: FloatArray) -> list[FloatArray]:
         for j, s in enumerate(share):
             found[1:, j] = lfilter([s], [1.0, s - 1.0], wanted[1:], zi=[(1.0 - s) * power[j]])[0]
         left = (flight.controls[f"power_{side}"][:, None] - found) / full[:, None]
-        # the chart between lever and power is nobody's claim: a constant share and an offset are taken out
-        out.append(_without_line(left, lever) / (POWER_NOISE * _weight(flight.dt)))
+        # the chart between lever and power is nobody's claim: a constant share and an offset are taken out, and where
+        # the owner's propeller lies between thrust and power, a share that changes with airspeed
+        charts = [lever] if flight.power_from == "torque" else [lever, lever * flight.channel("airspeed")]
+        out.append(_without_line(left, *charts) / (POWER_NOISE * _weight(flight.dt)))
     return out
 
 
@@ -275,6 +277,6 @@ def _weight(apart: float) -> float:
     return float(np.sqrt(max(CORRELATED / apart, 1.0)))
 
 
-def _without_line(left: FloatArray, lever: FloatArray) -> FloatArray:
-    base = np.column_stack([np.ones(len(lever)), lever])
+def _without_line(left: FloatArray, *shares: FloatArray) -> FloatArray:
+    base = np.column_stack([np.ones(len(left)), *shares])
     return left - base @ np.linalg.lstsq(base, left, rcond=None)[0]

@@ -29,7 +29,14 @@ THRUST_SPREAD = 0.3  # of power that was not recorded and is told by the levers 
 FILTER_SPREAD = 0.1  # of the recording's cut-off: channels are in step to a few ms (assumed)
 # s, s, rad s2/m: instruments that no paper describes may as well have no lag, and no boom (assumed)
 VANE_SPREAD, PITOT_SPREAD, BOOM_SPREAD = 0.008, 0.05, 1e-4
+# Numbers of which one source or none tells: heights of the thrust line and of the c.g. (0.1 m of 0.3), and what part of
+# the pitch damping comes from the delay of the downwash (a quasi-steady set has it in Cm_q); assumed
+TOLD_ONCE = {"engine_arm_z": 0.33, "Cm_alphadot": 0.1}
 VANE_SCALE = 0.015  # of a flow vane's reading, upwash included (assumed)
+# What a calibrated installation is still off by, in the channel's unit (assumed)
+CALIBRATION = {"bias_airspeed": 0.2, "bias_alpha": 1.5e-3, "bias_beta": 1.5e-3, "bias_p": 3e-4, "bias_q": 3e-4,
+               "bias_r": 3e-4, "bias_phi": 1.5e-3, "bias_theta": 1.5e-3, "bias_ax": 0.015, "bias_ay": 0.015,
+               "bias_az": 0.02}  # fmt: skip
 LEAST = 0.1  # of a published value: a filter or a thrust with another sign does not fly
 NODES, FEW = 4, 2  # sizes of a parameter; and where it only has to be seen whether it is worth more
 NUISANCE_STEP = 0.1  # standard deviations at which the derivative with respect to a nuisance is taken
@@ -94,14 +101,16 @@ class Bank:
 
 
 def nuisances() -> tuple[Nuisance, ...]:
-    """Derivatives by `SPREAD`, mass, the vanes' scales, lags and boom, the recorder, thrust told by levers."""
+    """Derivatives by `SPREAD`, mass, what levers or one source tell, instruments and the recorder."""
     derivatives = [Nuisance(name, name, SPREAD) for name in DERIVATIVE_NAMES]
     guessed = Nuisance("thrust", "thrust_factor_left+thrust_factor_right", THRUST_SPREAD, only="throttle")
     known = {"vane_lag": VANE_SPREAD, "pitot_lag": PITOT_SPREAD, "boom_gain": BOOM_SPREAD}
     timing = (Nuisance("filter_frequency", "filter_frequency", FILTER_SPREAD),
               *(Nuisance(name, name, spread, True) for name, spread in known.items()))
     vanes = [Nuisance(f"scale_{c}", f"scale_{c}", VANE_SCALE, True, follows=False) for c in ("alpha", "beta")]
-    return (*derivatives, Nuisance("mass", "mass", MASS_SPREAD), guessed, *vanes, *timing)
+    told_once = [Nuisance(name, name, spread) for name, spread in TOLD_ONCE.items()]
+    offsets = [Nuisance(name, name, spread, True, follows=False) for name, spread in CALIBRATION.items()]
+    return (*derivatives, Nuisance("mass", "mass", MASS_SPREAD), guessed, *told_once, *vanes, *offsets, *timing)
 
 
 def nodes(parameter: Parameter) -> tuple[float, ...]:
@@ -196,7 +205,7 @@ def not_testable(flight_list: list[Reconstruction], candidates: Bank) -> dict[st
     out = {"turbulence": "gust intensity is estimated with the noise, as part of what no model is expected to know"}
     commands = {name for flight in flight_list for name in flight.commands}
     has_beta = any(flight.has("beta") and flight.has("p") and flight.has("r") for flight in flight_list)
-    torque = any(flight.power_from == "torque" for flight in flight_list)
+    torque = any(flight.shaft_powers for flight in flight_list)
     balanced = all(flight.power_from == "balance" for flight in flight_list)
     for family in candidates.families:
         effect = family.effect

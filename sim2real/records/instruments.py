@@ -140,6 +140,18 @@ def declared(row: NDArray, record: FlightRecord, values: dict[str, FloatArray], 
     _recorder(row, sensors, dt, notes)
 
 
+def thrust_was_measured(record: FlightRecord) -> bool:
+    """Whether the record declares so: `thrust = { source = "measured" }`; else it is taken as computed from torque.
+
+    Raises:
+        InputError: another source.
+    """
+    source = _table(record.meta.sensors, "thrust").get("source", "computed")
+    if source not in ("measured", "computed"):
+        raise InputError(f"sensors.thrust.source must be measured or computed, got {source!r}")
+    return bool(source == "measured")
+
+
 def _recorder(row: NDArray, sensors: Any, dt: float, notes: list[str]) -> None:
     table = _table(sensors, "filter")
     for key in ("lag", "frequency"):

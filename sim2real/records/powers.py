@@ -1,9 +1,13 @@
 """Shaft powers that drive the model along a record: from what tells them best.
 
-Torque where recorded, less what spins a propeller up; else thrust, through the propeller's chart; else the levers,
+Thrust where recorded, through the propeller's chart; else torque, less what spins a propeller up; else the levers,
 through the engines' spool, with a chart between lever and power that is uncertain (`candidates.nuisances`); else what
 the recorded axial acceleration asks for beside the model's own drag. That acceleration is then no longer there to be
 compared, and nothing that a thrust may do as well can be told.
+
+Nobody measures thrust in ordinary flight tests: it is computed from the torque by a chart of the record's owner, which
+no published one of this aircraft is known well enough to contradict. Only where the side file says that thrust was
+measured (`sensors.thrust.source`) do torque and the model's chart drive it, and is what they make compared with it.
 """
 
 from __future__ import annotations
@@ -20,13 +24,13 @@ from icing_env.propulsion import power_available
 from icing_env.record import FloatArray
 
 SIDES = ("left", "right")
-SPIN = 1.0  # s, over which a line through the propeller's speed tells how it changes
+SPIN = 1.0  # s, over which a line through the propeller's speed tells how it changes, and quadratics how a power does
 EXPLAINS = 0.5  # of what recorded thrust has beside recorded power, that spinning up has to explain (assumed)
 Powers = dict[str, FloatArray]
 
 
-def powers(row: NDArray, values: Mapping[str, FloatArray], altitude: FloatArray, dt: float,
-           notes: list[str]) -> tuple[str, Powers]:  # fmt: skip
+def powers(row: NDArray, values: Mapping[str, FloatArray], altitude: FloatArray, dt: float, notes: list[str],
+           measured: bool = False) -> tuple[str, Powers]:  # fmt: skip
     """Powers left and right (W) at every sample, and where they come from: "torque", "thrust", "throttle", "balance".
 
     Args:
@@ -35,14 +39,18 @@ def powers(row: NDArray, values: Mapping[str, FloatArray], altitude: FloatArray,
         altitude: m (N,).
         dt: s.
         notes: gets what was assumed.
+        measured: whether thrust, where recorded, was measured and not computed.
     """
     p = row[0]
     per_power = thrust_per_power(p, values["airspeed"], values["alpha"])
-    if all(f"torque_{s}" in values for s in SIDES):
+    torque, thrust = (all(f"{name}_{s}" in values for s in SIDES) for name in ("torque", "thrust"))
+    if torque and (measured or not thrust):
         return "torque", _shaft_powers(p, values, per_power, dt, notes)
-    if all(f"thrust_{s}" in values for s in SIDES):
-        notes.append("torque not recorded: power from the recorded thrust")
-        return "thrust", {f"power_{s}": values[f"thrust_{s}"] / per_power for s in SIDES}
+    if thrust:
+        found = {f"power_{s}": values[f"thrust_{s}"] / per_power for s in SIDES}
+        notes.append(_of_the_chart(found, _shaft_powers(p, values, per_power, dt, [])) if torque
+                     else "torque not recorded: power from the recorded thrust")
+        return "thrust", found
     if all(f"throttle_{s}" in values for s in SIDES):
         notes.append("thrust and torque not recorded: power from the levers, through the published chart and spool")
         full = np.array([power_available(pressure(float(h)), p) for h in altitude])
@@ -50,6 +58,22 @@ def powers(row: NDArray, values: Mapping[str, FloatArray], altitude: FloatArray,
                             for s in SIDES}  # fmt: skip
     notes.append("thrust, torque and levers not recorded: the power that the axial acceleration asks for")
     return "balance", {f"power_{s}": 0.5 * _balancing(p, values, altitude) / per_power for s in SIDES}
+
+
+def as_engines_move(power: FloatArray, dt: float) -> FloatArray:
+    """A power [W] (N,) by local quadratics over a second: what comes of thrust has the noise of airspeed in it.
+
+    That noise would else go with what the airspeed reads, as if the reading depended on the power. No shaft power
+    changes faster (spools take a second).
+    """
+    length = 2 * max(1, round(0.5 * SPIN / dt)) + 1
+    return np.asarray(savgol_filter(power, length, 2)) if length <= len(power) else power
+
+
+def _of_the_chart(by_thrust: Powers, by_torque: Powers) -> str:
+    """How recorded thrust compares with what the published chart makes of the torque."""
+    share = sum(np.mean(v) for v in by_thrust.values()) / sum(np.mean(v) for v in by_torque.values())
+    return f"power from the recorded thrust, taken as computed: {share:.2f} of what the published chart makes of torque"
 
 
 def _shaft_powers(p: NDArray, values: Mapping[str, FloatArray], per_power: FloatArray, dt: float,

@@ -23,7 +23,7 @@ from icing_env.record import DataProblem, FlightRecord, FloatArray
 from sim2real.records import instruments
 from sim2real.records.channels import LATERAL, MEASURED, SURFACE_NOISE, SURFACES
 from sim2real.records.noise import channel_noise, power_noise
-from sim2real.records.powers import powers
+from sim2real.records.powers import as_engines_move, powers
 from sim2real.records.rounding import SEVERAL, rounding
 
 STILL = ("altitude", "thrust_left", "thrust_right")  # channels of which a constant reading says less than nothing
@@ -105,6 +105,11 @@ class Reconstruction:
     timing: float = TIMING
     kept: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
+    @property
+    def shaft_powers(self) -> bool:
+        """Whether powers show how engines follow their levers: by torque, or by thrust that was computed from it."""
+        return self.power_from == "torque" or (self.power_from == "thrust" and "torque_left" in self.record.channels)
+
     def channel(self, name: str) -> FloatArray:
         """One column of `measured`, gaps filled by interpolation; zeros where it was not recorded."""
         return self.once(("channel", name), lambda: self._filled(self.measured[:, MEASURED.index(name)]))
@@ -158,8 +163,8 @@ def reconstruct(record: FlightRecord, base: NDArray | None = None) -> Reconstruc
     controls["flap"] = values.get("flap", np.zeros(len(at)))
     notes.extend(f"{n} not recorded: " + ("where its command puts it" if f"{n}_command" in values else "taken as zero")
                  for n in SURFACES if n not in values)
-    source, driving = powers(row, values, altitude, dt, notes)
-    controls |= driving
+    source, driving = powers(row, values, altitude, dt, notes, instruments.thrust_was_measured(record))
+    controls |= {n: as_engines_move(v, dt) for n, v in driving.items()} if source == "thrust" else driving
     names = [*(f"{s}_command" for s in SURFACES), "throttle_left", "throttle_right"]
     commands = {n: values[n] for n in names if n in values}
     for name in MEASURED[-2:]:

@@ -22,6 +22,12 @@ SCALES = (0.75, 1.3)  # of the length of turbulence
 LEVELS = (0.5, 1.0, 1.5)  # of the published noise
 SHARES = {"null": 0.375, "single": 0.375, "pair": 0.125, "unknown": 0.125}
 SPREAD, MASS_RANGE = 0.05, 0.02
+# Numbers of which one source or none tells (assumed): height of the thrust line, +-0.1 m; the delay of the downwash
+TOLD_ONCE = {"engine_arm_z": 0.33, "Cm_alphadot": 0.1}
+# What a calibrated installation is off by, in the channel's unit (assumed)
+CALIBRATION = {"bias_airspeed": 0.2, "bias_alpha": 1.5e-3, "bias_beta": 1.5e-3, "bias_p": 3e-4, "bias_q": 3e-4,
+               "bias_r": 3e-4, "bias_phi": 1.5e-3, "bias_theta": 1.5e-3, "bias_ax": 0.015, "bias_ay": 0.015,
+               "bias_az": 0.02}  # fmt: skip
 SMALLEST, LARGEST = 0.7, 2.2  # of the typical size
 # Effects that must be larger for an ideal observer to name eight of them in 2,400 cases (`shares.py`): the spread of
 # derivatives or a near rival hides smaller ones.
@@ -30,6 +36,8 @@ LARGER = {"static_stability": (2.5, 2.9), "rudder_power": (2.6, 3.1), "mass_erro
           "pitch_damping": (2.1, 2.7), "lift_slope": (2.3, 2.9), "elevator_power": (2.0, 2.7),
           "roll_damping": (2.0, 2.6), "aileron_power": (1.25, 2.2), "dihedral_effect": (1.3, 2.2),
           "tail_ice": (1.7, 2.5), "wing_ice": (1.4, 2.5)}  # fmt: skip
+# Among calibrated aircraft, times as large as drawn: the height of the thrust line hides smaller ones.
+LARGER_STILL = {"power_pitching": 2.0}
 MOST = {"elevator_rate_limit": 0.95}
 
 
@@ -76,11 +84,14 @@ class Population(NamedTuple):
         strangers: effects of the second list alone (`strangers.py`).
         spread: of derivatives, one standard deviation.
         gusts: one of `conditions.KINDS`, or "mixed": each in turn.
+        calibrated: numbers of which one source or none tells are off as well, and instruments by what a calibration
+            leaves: as in every set that is drawn today.
     """
 
     strangers: bool = False
     spread: float = SPREAD
     gusts: str = "later"
+    calibrated: bool = False
 
     def told(self) -> dict[str, Any]:
         """What a manifest says of it: what is not as usual."""
@@ -95,8 +106,12 @@ class Population(NamedTuple):
         """Cases as they were drawn, among such aircraft and in such gusts; a given seed does the same again."""
         rng = np.random.default_rng(np.random.SeedSequence([seed, len(drawn), 5]))
         order = rng.permutation(len(drawn)) % len(KINDS)
-        return [replace(wider(design, self.spread), gusts=KINDS[k] if self.gusts == "mixed" else self.gusts)
-                for design, k in zip(drawn, order, strict=True)]
+        beside = [_about(1.0, TOLD_ONCE, rng) | _about(0.0, CALIBRATION, rng) if self.calibrated else {} for _ in drawn]
+        larger = LARGER_STILL if self.calibrated else {}
+        return [replace(wider(design, self.spread), gusts=KINDS[k] if self.gusts == "mixed" else self.gusts,
+                        baseline=wider(design, self.spread).baseline | more,
+                        parts=tuple((name, form, size * larger.get(name, 1.0)) for name, form, size in design.parts))
+                for design, k, more in zip(drawn, order, beside, strict=True)]
 
 
 USUAL = Population()
@@ -180,5 +195,10 @@ def wider(design: Design, spread: float) -> Design:
 
 def published_spread(rng: np.random.Generator) -> dict[str, float]:
     """Factors on derivatives (5 %, one standard deviation, not beyond three) and on the mass (uniform)."""
-    spread = {name: 1.0 + SPREAD * float(np.clip(rng.standard_normal(), -3.0, 3.0)) for name in DERIVATIVES}
+    spread = _about(1.0, dict.fromkeys(DERIVATIVES, SPREAD), rng)
     return {**spread, "mass": 1.0 + float(rng.uniform(-MASS_RANGE, MASS_RANGE))}
+
+
+def _about(mean: float, spreads: Mapping[str, float], rng: np.random.Generator) -> dict[str, float]:
+    """Numbers about a mean by name, of such standard deviations, not beyond three."""
+    return {name: mean + size * float(np.clip(rng.standard_normal(), -3.0, 3.0)) for name, size in spreads.items()}

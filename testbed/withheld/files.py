@@ -52,7 +52,8 @@ def side_text(flight: str, role: str) -> str:
     n = PUBLISHED
     return "\n".join([
         'aircraft = "twin_otter"', f'flight = "{flight}"', f'role = "{role}"', f"mass = {n['mass']}",
-        "cg = [0.0, 0.0, 0.0]", "", "[inertia]", *(f"{a} = {n[f'inertia_{a}']}" for a in ("xx", "yy", "zz", "xz")), "",
+        "cg = [0.0, 0.0, 0.0]", "", "[sensors.thrust]", 'source = "measured"', "", "[inertia]",
+        *(f"{a} = {n[f'inertia_{a}']}" for a in ("xx", "yy", "zz", "xz")), "",
         "[geometry]", *(f"{a} = {n[a]}" for a in ("wing_area", "span", "chord")), ""])
 
 

@@ -18,8 +18,9 @@ CATALOGUE = {**effects.BY_NAME, **unknown.BY_NAME, **strangers.BY_NAME}
 
 @dataclass(frozen=True)
 class Aircraft:
-    """What is flown: `baseline` factors by number (spread of derivatives, mass) and `parts` (effect, form, size).
+    """What is flown: `baseline` and `parts` (effect, form, size).
 
+    `baseline`: factors by number (spread of derivatives, mass), and what instruments are off by.
     `terms`: what is added to numbers of the airframe and of the instruments beside, by name.
     """
 
@@ -42,6 +43,8 @@ class Aircraft:
                 else:
                     row[key] *= value / neutral
         for key, factor in self.baseline.items():
+            if key in SENSOR_KNOBS:
+                continue
             row[key] *= factor
             if f"{key}_soft" in (DTYPE.names or ()):
                 row[f"{key}_soft"] *= factor
@@ -56,8 +59,9 @@ class Aircraft:
         for name, form, size in self.parts:
             for key, value in getattr(CATALOGUE[name], form)(size)[1].items():
                 wrong[key] = wrong.get(key, 0.0) + value
-        for key in set(self.terms) & set(SENSOR_KNOBS):
-            wrong[key] = wrong.get(key, 0.0) + self.terms[key]
+        for own in (self.baseline, self.terms):
+            for key in set(own) & set(SENSOR_KNOBS):
+                wrong[key] = wrong.get(key, 0.0) + own[key]
         return wrong
 
 

@@ -105,7 +105,7 @@ class Told:
 
     Attributes:
         parts: effects, all in the library's form.
-        factors: its derivatives and mass over the published ones, by name.
+        factors: its derivatives, mass and thrust line over the published ones, by name.
         terms: what it adds to numbers of the airframe and the instruments, by name.
         lacking: what the generator has no number for.
     """
