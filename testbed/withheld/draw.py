@@ -37,7 +37,7 @@ LARGER = {"static_stability": (2.5, 2.9), "rudder_power": (2.6, 3.1), "mass_erro
           "roll_damping": (2.0, 2.6), "aileron_power": (1.25, 2.2), "dihedral_effect": (1.3, 2.2),
           "tail_ice": (1.7, 2.5), "wing_ice": (1.4, 2.5)}  # fmt: skip
 # Among calibrated aircraft, times as large as drawn: the height of the thrust line hides smaller ones.
-LARGER_STILL = {"power_pitching": 2.0}
+LARGER_STILL = {"power_pitching": 1.8}
 MOST = {"elevator_rate_limit": 0.95}
 
 
