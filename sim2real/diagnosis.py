@@ -16,6 +16,7 @@ from sim2real.actuators.surfaces import placed
 from sim2real.actuators.timing import in_step
 from sim2real.answer import credible, describe, detection_limits, judge, problems, provenance, ranked
 from sim2real.baseline.loading import of_another_loading, otherwise_loaded
+from sim2real.baseline.quasi_steady import NOTE, undoes_the_lag, without_lag
 from sim2real.baseline.references import Baseline, fit_baseline, uncertain
 from sim2real.change import Changed, changed, flown_freely
 from sim2real.closing import gap
@@ -99,9 +100,13 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     """
     began = time.perf_counter()
     at_hand = _at_hand(records, held_out, reference, tuple(without), simulator, progress)
+    weighed = fit(at_hand.flights, at_hand.candidates, at_hand.untestable, at_hand.baseline, progress)
+    if not (reference or simulator) and undoes_the_lag(weighed[1], at_hand.baseline):
+        progress("weighing again about an aircraft whose downwash does not lag")
+        at_hand = _over(without_lag(at_hand.baseline), at_hand, records, held_out)
+        weighed = fit(at_hand.flights, at_hand.candidates, at_hand.untestable, at_hand.baseline, progress)
     flights, others, candidates = at_hand.flights, at_hand.others, at_hand.candidates
-    untestable = not_testable(flights, candidates)
-    evidences, posterior, baseline = fit(flights, candidates, untestable, at_hand.baseline, progress)
+    evidences, posterior, baseline = weighed
     found = changed(flights, candidates, evidences, baseline, posterior, seed, not (reference or simulator), progress)
     posterior, explained, flown = found.posterior, found.told.explained, found.flown
     sizes = _over_time(replace(at_hand, baseline=baseline), evidences, found, progress)
@@ -125,7 +130,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
                "regimes": regimes(evidences)},
         effects=[describe(name, posterior, explained, found.told.form, sizes.get(name, SAME))
                  for name, p in ranked(posterior) if p >= LISTED],
-        not_testable=[{"effect": name, "why": why} for name, why in sorted(untestable.items())],
+        not_testable=[{"effect": name, "why": why} for name, why in sorted(at_hand.untestable.items())],
         detection_limits=detection_limits(posterior.fits, shown),
         unknown=None if lacking is None else lacking.answer(),
         gap=closes,
@@ -145,7 +150,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
 class _AtHand:
     """What a diagnosis begins with: the records over the model that references corrected, and the library.
 
-    without: effects left out of it.
+    without: effects left out of it; untestable: those that the records cannot show, with the reason.
     """
 
     flights: list[Reconstruction]
@@ -153,6 +158,7 @@ class _AtHand:
     candidates: Bank
     baseline: Baseline
     without: tuple[str, ...]
+    untestable: dict[str, str]
 
 
 def _at_hand(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord], reference: Sequence[FlightRecord],
@@ -170,8 +176,18 @@ def _at_hand(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord], 
         if otherwise_loaded(reference, records):
             baseline = of_another_loading(baseline, candidates.nuisances)
         candidates = replace(candidates, clean=baseline.clean)
-    return _AtHand(_reconstructed(records, baseline, simulator), _reconstructed(held_out, baseline, simulator),
-                   candidates, baseline, without)
+    flights = _reconstructed(records, baseline, simulator)
+    return _AtHand(flights, _reconstructed(held_out, baseline, simulator), candidates, baseline, without,
+                   not_testable(flights, candidates))
+
+
+def _over(baseline: Baseline, before: _AtHand, records: Sequence[FlightRecord], held_out: Sequence[FlightRecord]
+          ) -> _AtHand:  # fmt: skip
+    """The same over a quasi-steady model, which the records' notes tell."""
+    flights, others = ([replace(f, notes=(*f.notes, NOTE)) for f in _reconstructed(some, baseline, None)]
+                       for some in (records, held_out))
+    return replace(before, flights=flights, others=others, baseline=baseline,
+                   untestable=not_testable(flights, before.candidates))
 
 
 def _over_time(at_hand: _AtHand, evidences: Sequence[Evidence], found: Changed, progress: Progress

@@ -23,6 +23,6 @@ EFFECT = Effect(
     enters_at=("x_force", "y_force", "z_force", "rolling_moment", "pitching_moment", "yawing_moment", "mass"),
     description="Derivatives, mass and thrust line, by what part of the model's they differ from it",
     source="docs/model.md, section 20",
-    parameters=tuple(Parameter(name, "1", neutral=0.0, typical=0.0, low=-0.9, high=10.0) for name in NUMBERS),
+    parameters=tuple(Parameter(name, "1", neutral=0.0, typical=0.0, low=-1.0, high=10.0) for name in NUMBERS),
     apply=apply,
 )

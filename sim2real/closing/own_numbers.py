@@ -14,12 +14,11 @@ import numpy as np
 from icing_env.effects.derivatives import NUMBERS
 from sim2real.closing.discrepancy import Description
 from sim2real.closing.flyable import COEFFICIENT
-from sim2real.closing.remedy import Remedy
+from sim2real.closing.remedy import OWN, Remedy
 from sim2real.library.candidates import LEAST, Nuisance
 from sim2real.posterior.hypotheses import Hypothesis, Settled
 from sim2real.posterior.widened import OWN_NUMBERS
 
-EFFECT = "derivatives"  # by which they are flown
 FARTHEST = 3.5  # prior deviations that none of some thirty numbers is off by, but for one aircraft in seventy
 
 
@@ -46,8 +45,8 @@ def with_own_numbers(alone: Remedy, explained: Hypothesis | None, described: Des
 def of_component(change: Remedy, component: str) -> Remedy:
     """The change with those of the model's own numbers alone that are derivatives at a component."""
     own = COEFFICIENT.get(component, "none") + "_"
-    kept = {name: value for name, value in change.values.get(EFFECT, {}).items() if name.startswith(own)}
-    return replace(change, values={EFFECT: kept} | {n: v for n, v in change.values.items() if n != EFFECT})
+    kept = {name: value for name, value in change.values.get(OWN, {}).items() if name.startswith(own)}
+    return replace(change, values={OWN: kept} | {n: v for n, v in change.values.items() if n != OWN})
 
 
 def own_numbers(settled: Settled, moves: Sequence[Nuisance]) -> Remedy:
@@ -55,4 +54,4 @@ def own_numbers(settled: Settled, moves: Sequence[Nuisance]) -> Remedy:
     own = {move.parameter: (max(move.factor * float(size), LEAST - 1.0), OWN_NUMBERS * move.factor * float(error))
            for move, size, error in zip(moves, settled.nuisances, settled.error, strict=True)
            if move.parameter in NUMBERS}  # fmt: skip
-    return Remedy({EFFECT: {name: change for name, (change, _) in own.items()}}, own=own)
+    return Remedy({OWN: {name: change for name, (change, _) in own.items()}}, own=own)

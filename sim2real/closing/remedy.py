@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from scipy.linalg import block_diag
 from icing_env import effects
 from icing_env.effects.discrepancy import PATHS
 from icing_env.record import FloatArray
+from sim2real.baseline.quasi_steady import NUMBER, lacks_the_lag
 from sim2real.closing import gap
 from sim2real.closing.discrepancy import Description
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
@@ -23,6 +24,7 @@ from sim2real.records.channels import SURFACES
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.evidence import Evidence
 
+OWN = "derivatives"  # the effect that flies the model's own numbers
 Values = dict[str, dict[str, float]]
 
 
@@ -108,6 +110,9 @@ def resimulation(change: Remedy, training: gap.Energy, flights: Sequence[Reconst
     records = [{"initial_state": dict(zip(FREE, (float(v) for v in start), strict=True)),
                 "wind": {"sigma_w": evidence.gusts.sigma, **evidence.gusts.kind._asdict()}, "biases": {}}
                for start, evidence in zip(starts, evidences, strict=True)]
+    if any(lacks_the_lag(flight) for flight in flights):  # which the aircraft that a command flies has
+        own = {**change.values.get(OWN, {}), NUMBER: -1.0}
+        change = replace(change, values={OWN: own} | {n: v for n, v in change.values.items() if n != OWN})
     return {"command": change.command, "records": records,
             "parameter_covariance": None if change.covariance is None else np.asarray(change.covariance).tolist(),
             "model": {name: {"change": size, "std_error": error} for name, (size, error) in change.own.items()}}
