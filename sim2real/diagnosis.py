@@ -12,6 +12,7 @@ import numpy as np
 from icing_env import aircraft, effects
 from icing_env.errors import InputError, nearest
 from icing_env.record import FlightRecord, FloatArray
+from sim2real.actuators.servos import of_all_servos
 from sim2real.actuators.surfaces import placed
 from sim2real.actuators.timing import in_step
 from sim2real.answer import credible, describe, detection_limits, judge, problems, provenance, ranked
@@ -227,7 +228,7 @@ def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, s
     records = with_recorder(records)
     flights = [reconstruct(record) for record in records] if baseline is None else [
         replace(reconstruct(record, baseline.near(record)), inadequacy=baseline.inadequacy) for record in records]
-    flights = in_common([placed(flight) for flight in prompt(met_together(in_step(flights)))])
+    flights = in_common([placed(flight) for flight in prompt(met_together(in_step(of_all_servos(flights))))])
     if simulator is None:
         return flights
     yours = [flying_as(reconstruct(record), simulator) for record in records]

@@ -45,7 +45,7 @@ def in_step(flights: Sequence[Reconstruction]) -> list[Reconstruction]:
 def _shift(flights: Sequence[Reconstruction], moved: Sequence[str]) -> float:
     """Samples by which commands are to be taken later."""
     lag = LATER if len(moved) == 1 else np.inf  # of one surface, a lag of its own is as good as a delay
-    squares = np.array([[_square(flights, s, shift, lag) for shift in SHIFTS] for s in moved])
+    squares = np.array([[square(flights, s, shift, lag) for shift in SHIFTS] for s in moved])
     against = np.minimum(squares - squares.min(axis=1, keepdims=True), VOTE).sum(axis=0)
     whole = np.isin(SHIFTS, (0.0, 1.0))
     against[~whole] += LATER if len(moved) > 1 else np.inf
@@ -72,7 +72,7 @@ def _sharpest(flights: Sequence[Reconstruction], moved: Sequence[str]) -> list[f
     for share in SHARPNESS:
         timing = [float(max(f.timing, share * f.dt / np.sqrt(12.0))) for f in flights]
         known = [replace(f, timing=t) for f, t in zip(flights, timing, strict=True)]
-        followed = [_square(known, s, 0.0, np.inf) < FOLLOWED * _counted(known, s) for s in moved]
+        followed = [square(known, s, 0.0, np.inf) < FOLLOWED * _counted(known, s) for s in moved]
         if sum(followed) >= max(len(moved) - 1, 1):
             break
     return timing
@@ -82,7 +82,7 @@ def _counted(flights: Sequence[Reconstruction], surface: str) -> int:
     return sum(counted(f, f"{surface}_path") for f in flights if moves(f, surface))
 
 
-def _square(flights: Sequence[Reconstruction], surface: str, shift: float, other: float) -> float:
+def square(flights: Sequence[Reconstruction], surface: str, shift: float, other: float) -> float:
     """Whitened square of a surface's positions behind its command, `shift` samples later; another lag costs `other`."""
     lags = LAGS if np.isfinite(other) else LAGS[:1]
     total = np.sum([_left(flight, surface, shift, lags) for flight in flights if moves(flight, surface)], axis=0)
