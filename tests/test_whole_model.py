@@ -46,7 +46,7 @@ def found(records):
 
 
 def test_many_numbers_at_once_are_told_with_their_sizes(found):
-    assert found.verdict == "unknown" and found.provenance["tempering"] > whole_model.ANOTHER
+    assert found.verdict == "unknown" and found.unknown["places"]
     told = {e["name"]: next(iter(e["parameters"].values())) for e in found.effects if e["probability"] >= 0.5}
     assert {"side_force", "aileron_power", "pitch_trim"} <= told.keys()
     for name in told.keys() & SIZES.keys():

@@ -1,7 +1,8 @@
-"""The aircraft's own derivatives, mass and thrust line, so much of the model's: numbers that a diagnosis refined.
+"""The aircraft's own numbers: derivatives, mass and thrust line, so much of the model's, and offsets of instruments.
 
-Published derivatives are off by some 5 % in any aircraft; a diagnosis fits them beside the effects that it looks for.
-Like `discrepancy` this belongs to no library: it explains nothing.
+Published derivatives are off by some 5 % in any aircraft, and a calibration leaves its instruments off by something; a
+diagnosis fits both beside the effects that it looks for. Like `discrepancy` this belongs to no library: it explains
+nothing.
 """
 
 from numpy.typing import NDArray
@@ -10,19 +11,26 @@ from icing_env.effects.effect import Effect, Parameter, Values
 from icing_env.types import DERIVATIVE_NAMES
 
 NUMBERS = (*DERIVATIVE_NAMES, "mass", "engine_arm_z", "Cm_alphadot")
+OFFSETS = {"bias_airspeed": "m/s", "bias_alpha": "rad", "bias_beta": "rad", "bias_p": "rad/s", "bias_q": "rad/s",
+           "bias_r": "rad/s", "bias_phi": "rad", "bias_theta": "rad", "bias_ax": "m/s2", "bias_ay": "m/s2",
+           "bias_az": "m/s2"}  # fmt: skip
 
 
 def apply(p: NDArray, values: Values) -> None:
     for name in NUMBERS:
         p[name] *= 1.0 + values[name]
+    for name in OFFSETS:
+        p[name] += values[name]
 
 
 EFFECT = Effect(
     name="derivatives",
     component="aerodynamics",
     enters_at=("x_force", "y_force", "z_force", "rolling_moment", "pitching_moment", "yawing_moment", "mass"),
-    description="Derivatives, mass and thrust line, by what part of the model's they differ from it",
+    description="Derivatives, mass and thrust line, by what part of the model's; offsets of channels",
     source="docs/model.md, section 20",
-    parameters=tuple(Parameter(name, "1", neutral=0.0, typical=0.0, low=-1.0, high=10.0) for name in NUMBERS),
+    parameters=(*(Parameter(name, "1", neutral=0.0, typical=0.0, low=-1.0, high=10.0) for name in NUMBERS),
+                *(Parameter(name, unit, neutral=0.0, typical=0.0, low=-10.0, high=10.0)
+                  for name, unit in OFFSETS.items())),
     apply=apply,
 )

@@ -31,9 +31,6 @@ ROUNDS, SETTLED = 10, 4.0  # flown steps, and the whitened length of one that en
 AGAIN = 2  # the round after which gust intensities are chosen anew at every step: what does not fit passes for gusts
 LONGEST = 40.0  # standard deviations that a step may move a number
 REFERENCE_SPEED = 65.0  # m/s, where a number has its value; it changes with (65/V)^2, as alpha does in level flight
-# Weak derivatives, on which sources and flights differ by 10 to 30 %: times the published spread
-WEAK = dict.fromkeys(
-    ("CZ_q", "CZ_elevator", "CY_p", "CY_r", "CY_rudder", "Cl_r", "Cl_rudder", "Cn_p", "Cn_aileron"), 3.0)
 CHANGES = 1.0  # prior standard deviation of that change at twice the dynamic pressure, in that of the value (assumed)
 # What the published spread leaves alone and another aircraft may have: standard deviations (assumed). No cubes: where
 # the references did not fly, they run away.
@@ -128,7 +125,6 @@ def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank) -> Baselin
     """The model corrected by reference flights, and the precision with which they leave it."""
     moves, at = directions(candidates), np.array([_condition(float(np.median(f.channel("airspeed")))) for f in flights])
     fit = Fit(flights, moves, at)
-    fit.spread[: len(moves)] = [WEAK.get(move.name, 1.0) for move in moves]
     fit.run()
     return fit.baseline(candidates)
 

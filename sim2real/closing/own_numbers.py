@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from icing_env.effects.derivatives import NUMBERS
+from icing_env.effects.derivatives import NUMBERS, OFFSETS
 from sim2real.closing.discrepancy import Description
 from sim2real.closing.flyable import COEFFICIENT
 from sim2real.closing.remedy import OWN, Remedy
@@ -50,8 +50,9 @@ def of_component(change: Remedy, component: str) -> Remedy:
 
 
 def own_numbers(settled: Settled, moves: Sequence[Nuisance]) -> Remedy:
-    """The aircraft with derivatives and mass as they settled, and nothing else changed."""
-    own = {move.parameter: (max(move.factor * float(size), LEAST - 1.0), OWN_NUMBERS * move.factor * float(error))
+    """The aircraft with derivatives, mass, thrust line and offsets as they settled, and nothing else changed."""
+    own = {move.parameter: (move.factor * float(size) if move.absolute else max(move.factor * float(size), LEAST - 1.0),
+                            OWN_NUMBERS * move.factor * float(error))
            for move, size, error in zip(moves, settled.nuisances, settled.error, strict=True)
-           if move.parameter in NUMBERS}  # fmt: skip
+           if move.parameter in (*NUMBERS, *OFFSETS)}  # fmt: skip
     return Remedy({OWN: {name: change for name, (change, _) in own.items()}}, own=own)

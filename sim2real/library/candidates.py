@@ -25,6 +25,9 @@ from sim2real.records.reconstruct import Reconstruction
 # The published sets of derivatives differ by about 5 % where they are well identified: the standard deviation of the
 # model's own uncertainty. A record's mass is known to about 1 % (assumed).
 SPREAD, MASS_SPREAD = 0.05, 0.01
+# Weak derivatives, on which sources and flights differ by 10 to 30 %: times that spread
+WEAK = dict.fromkeys(
+    ("CZ_q", "CZ_elevator", "CY_p", "CY_r", "CY_rudder", "Cl_r", "Cl_rudder", "Cn_p", "Cn_aileron"), 3.0)
 THRUST_SPREAD = 0.3  # of power that was not recorded and is told by the levers (assumed)
 FILTER_SPREAD = 0.1  # of the recording's cut-off: channels are in step to a few ms (assumed)
 # s, s, rad s2/m: instruments that no paper describes may as well have no lag, and no boom (assumed)
@@ -101,8 +104,8 @@ class Bank:
 
 
 def nuisances() -> tuple[Nuisance, ...]:
-    """Derivatives by `SPREAD`, mass, what levers or one source tell, instruments and the recorder."""
-    derivatives = [Nuisance(name, name, SPREAD) for name in DERIVATIVE_NAMES]
+    """Derivatives by `SPREAD` and `WEAK`, mass, what levers or one source tell, instruments and the recorder."""
+    derivatives = [Nuisance(name, name, SPREAD * WEAK.get(name, 1.0)) for name in DERIVATIVE_NAMES]
     guessed = Nuisance("thrust", "thrust_factor_left+thrust_factor_right", THRUST_SPREAD, only="throttle")
     known = {"vane_lag": VANE_SPREAD, "pitot_lag": PITOT_SPREAD, "boom_gain": BOOM_SPREAD}
     timing = (Nuisance("filter_frequency", "filter_frequency", FILTER_SPREAD),

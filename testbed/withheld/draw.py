@@ -22,6 +22,9 @@ SCALES = (0.75, 1.3)  # of the length of turbulence
 LEVELS = (0.5, 1.0, 1.5)  # of the published noise
 SHARES = {"null": 0.375, "single": 0.375, "pair": 0.125, "unknown": 0.125}
 SPREAD, MASS_RANGE = 0.05, 0.02
+# Weak derivatives, on which sources and flights differ by 10 to 30 %: times as far off among calibrated aircraft
+WEAK = dict.fromkeys(
+    ("CZ_q", "CZ_elevator", "CY_p", "CY_r", "CY_rudder", "Cl_r", "Cl_rudder", "Cn_p", "Cn_aileron"), 3.0)
 # Numbers of which one source or none tells (assumed): height of the thrust line, +-0.1 m; the delay of the downwash
 TOLD_ONCE = {"engine_arm_z": 0.33, "Cm_alphadot": 0.1}
 # What a calibrated installation is off by, in the channel's unit (assumed)
@@ -84,8 +87,8 @@ class Population(NamedTuple):
         strangers: effects of the second list alone (`strangers.py`).
         spread: of derivatives, one standard deviation.
         gusts: one of `conditions.KINDS`, or "mixed": each in turn.
-        calibrated: numbers of which one source or none tells are off as well, and instruments by what a calibration
-            leaves: as in every set that is drawn today.
+        calibrated: weak derivatives are farther off, numbers of which one source or none tells are off as well, and
+            instruments by what a calibration leaves: as in every set that is drawn today.
     """
 
     strangers: bool = False
@@ -108,8 +111,9 @@ class Population(NamedTuple):
         order = rng.permutation(len(drawn)) % len(KINDS)
         beside = [_about(1.0, TOLD_ONCE, rng) | _about(0.0, CALIBRATION, rng) if self.calibrated else {} for _ in drawn]
         larger = LARGER_STILL if self.calibrated else {}
-        return [replace(wider(design, self.spread), gusts=KINDS[k] if self.gusts == "mixed" else self.gusts,
-                        baseline=wider(design, self.spread).baseline | more,
+        spreads = {name: self.spread * (WEAK.get(name, 1.0) if self.calibrated else 1.0) for name in DERIVATIVES}
+        return [replace(design, gusts=KINDS[k] if self.gusts == "mixed" else self.gusts,
+                        baseline=wider(design.baseline, spreads) | more,
                         parts=tuple((name, form, size * larger.get(name, 1.0)) for name, form, size in design.parts))
                 for design, k, more in zip(drawn, order, beside, strict=True)]
 
@@ -186,11 +190,11 @@ def _target(rng: np.random.Generator) -> float:
     return float(low * (high / low) ** rng.random())
 
 
-def wider(design: Design, spread: float) -> Design:
-    """The same case with derivatives that are off by as many deviations of another spread."""
-    off = {name: 1.0 + (factor - 1.0) * spread / SPREAD if name in DERIVATIVES else factor
-           for name, factor in design.baseline.items()}  # fmt: skip
-    return design if spread == SPREAD else replace(design, baseline=off)
+def wider(baseline: Mapping[str, float], spreads: Mapping[str, float]) -> dict[str, float]:
+    """The same aircraft with derivatives that are off by as many deviations of other spreads."""
+    times = {name: spread / SPREAD for name, spread in spreads.items() if spread != SPREAD}
+    return {name: 1.0 + (factor - 1.0) * times[name] if name in times else factor
+            for name, factor in baseline.items()}  # fmt: skip
 
 
 def published_spread(rng: np.random.Generator) -> dict[str, float]:

@@ -105,7 +105,7 @@ class Told:
 
     Attributes:
         parts: effects, all in the library's form.
-        factors: its derivatives, mass and thrust line over the published ones, by name.
+        factors: its derivatives, mass and thrust line over the published ones, and offsets of its instruments, by name.
         terms: what it adds to numbers of the airframe and the instruments, by name.
         lacking: what the generator has no number for.
     """
@@ -122,7 +122,7 @@ def told(answer: dict[str, Any]) -> Told:
     lacking = list[str]()
     for name, values in _effects(answer.get("resimulate", {}).get("command", "")):
         if name == "derivatives":
-            factors |= {key: 1.0 + value for key, value in values.items()}
+            factors |= {key: value if key in SENSOR_KNOBS else 1.0 + value for key, value in values.items()}
         elif name == "discrepancy":
             more, missing = numbers(values)
             terms |= more
