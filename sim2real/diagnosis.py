@@ -17,7 +17,7 @@ from sim2real.actuators.surfaces import placed
 from sim2real.actuators.timing import in_step
 from sim2real.answer import credible, describe, detection_limits, judge, problems, provenance, ranked
 from sim2real.baseline.loading import of_another_loading, otherwise_loaded
-from sim2real.baseline.quasi_steady import NOTE, undoes_the_lag, without_lag
+from sim2real.baseline.quasi_steady import NOTE, simpler, undoes_the_lag, without_lag, worth_trying
 from sim2real.baseline.references import Baseline, fit_baseline, uncertain
 from sim2real.change import Changed, changed, flown_freely
 from sim2real.closing import gap
@@ -101,11 +101,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
     """
     began = time.perf_counter()
     at_hand = _at_hand(records, held_out, reference, tuple(without), simulator, progress)
-    weighed = fit(at_hand.flights, at_hand.candidates, at_hand.untestable, at_hand.baseline, progress)
-    if not (reference or simulator) and undoes_the_lag(weighed[1], at_hand.baseline):
-        progress("weighing again about an aircraft whose downwash does not lag")
-        at_hand = _over(without_lag(at_hand.baseline), at_hand, records, held_out)
-        weighed = fit(at_hand.flights, at_hand.candidates, at_hand.untestable, at_hand.baseline, progress)
+    at_hand, weighed = _weighed(at_hand, records, held_out, not (reference or simulator), progress)
     flights, others, candidates = at_hand.flights, at_hand.others, at_hand.candidates
     evidences, posterior, baseline = weighed
     found = changed(flights, candidates, evidences, baseline, posterior, seed, not (reference or simulator), progress)
@@ -180,6 +176,19 @@ def _at_hand(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord], 
     flights = _reconstructed(records, baseline, simulator)
     return _AtHand(flights, _reconstructed(held_out, baseline, simulator), candidates, baseline, without,
                    not_testable(flights, candidates))
+
+
+def _weighed(at_hand: _AtHand, records: Sequence[FlightRecord], held_out: Sequence[FlightRecord], published: bool,
+             progress: Progress) -> tuple[_AtHand, tuple[list[Evidence], Posterior, Baseline]]:  # fmt: skip
+    """What the records say about a model; `published`: about the published one, which may be read as quasi-steady."""
+    first = fit(at_hand.flights, at_hand.candidates, at_hand.untestable, at_hand.baseline, progress)
+    plain = published and undoes_the_lag(first[1], at_hand.baseline)
+    if not plain and not (published and worth_trying(first[1], at_hand.baseline)):
+        return at_hand, first
+    progress("weighing again about an aircraft whose downwash does not lag")
+    other = _over(without_lag(at_hand.baseline), at_hand, records, held_out)
+    again = fit(other.flights, other.candidates, other.untestable, other.baseline, progress)
+    return (other, again) if plain or simpler(again[1], first[1]) else (at_hand, first)
 
 
 def _over(baseline: Baseline, before: _AtHand, records: Sequence[FlightRecord], held_out: Sequence[FlightRecord]

@@ -3,7 +3,8 @@
 UIUC's set and those of NASA's flights have the moment of the lagging downwash within Cm_q. The model takes it out
 (Cm_alphadot of JSBSim's aircraft, their sum kept); a simulator that was built on such a set by itself has no lag at
 all. That is another reading of the same source, and no gap: where records show a `downwash_lag` that undoes the lag,
-they are diagnosed again about a model without it.
+they are diagnosed again about a model without it, and so they are where the best explanation of a gap in pitch has
+several causes or an unknown one, of which that model may need fewer.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from sim2real.baseline.references import Baseline
 from sim2real.posterior.hypotheses import Posterior
 from sim2real.records.reconstruct import Reconstruction
 
-EFFECT, NUMBER = "downwash_lag", "Cm_alphadot"
+EFFECT, NUMBER, PITCH = "downwash_lag", "Cm_alphadot", "pitching_moment"
 UNDONE, KNOWN = 0.15, 0.1  # share of the lag that may be left, and to which the records tell it (assumed)
 NOTE = "the downwash does not lag, as in a quasi-steady set of derivatives taken by itself: no gap"
 
@@ -30,6 +31,21 @@ def undoes_the_lag(posterior: Posterior, baseline: Baseline) -> bool:
     left = abs(fit.estimate[at] - published)
     error = 0.25 * (fit.high95[at] - fit.low95[at])
     return left < UNDONE * published and error < KNOWN * published
+
+
+def worth_trying(posterior: Posterior, baseline: Baseline) -> bool:
+    """Whether a model without the lag may say it more simply: several causes, or an unknown one, some in pitch."""
+    best = posterior.best
+    if best.things == 0 or (best.things == 1 and best.unknown is None) or not float(baseline.parameters[NUMBER][0]):
+        return False
+    places = {place for family in best.fit.families for place in family.effect.enters_at}
+    return PITCH in places or (best.unknown is not None and best.unknown.component == PITCH)
+
+
+def simpler(now: Posterior, before: Posterior) -> bool:
+    """Whether the best explanation has fewer causes, or as many and no unknown one any more."""
+    known = now.best.unknown is None and before.best.unknown is not None
+    return now.best.things < before.best.things + known
 
 
 def without_lag(baseline: Baseline) -> Baseline:

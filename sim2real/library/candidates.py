@@ -32,9 +32,9 @@ THRUST_SPREAD = 0.3  # of power that was not recorded and is told by the levers 
 FILTER_SPREAD = 0.1  # of the recording's cut-off: channels are in step to a few ms (assumed)
 # s, s, rad s2/m: instruments that no paper describes may as well have no lag, and no boom (assumed)
 VANE_SPREAD, PITOT_SPREAD, BOOM_SPREAD = 0.008, 0.05, 1e-4
-# Numbers of which one source or none tells: heights of the thrust line and of the c.g. (0.1 m of 0.3), and what part of
+# Numbers of which one source or none tells: heights of thrust line and c.g. (0.15 m of 0.3), and what part of
 # the pitch damping comes from the delay of the downwash (a quasi-steady set has it in Cm_q); assumed
-TOLD_ONCE = {"engine_arm_z": 0.33, "Cm_alphadot": 0.1}
+TOLD_ONCE = {"engine_arm_z": 0.5, "Cm_alphadot": 0.1}
 VANE_SCALE = 0.015  # of a flow vane's reading, upwash included (assumed)
 # What a calibrated installation is still off by, in the channel's unit (assumed)
 CALIBRATION = {"bias_airspeed": 0.2, "bias_alpha": 1.5e-3, "bias_beta": 1.5e-3, "bias_p": 3e-4, "bias_q": 3e-4,

@@ -25,8 +25,8 @@ SPREAD, MASS_RANGE = 0.05, 0.02
 # Weak derivatives, on which sources and flights differ by 10 to 30 %: times as far off among calibrated aircraft
 WEAK = dict.fromkeys(
     ("CZ_q", "CZ_elevator", "CY_p", "CY_r", "CY_rudder", "Cl_r", "Cl_rudder", "Cn_p", "Cn_aileron"), 3.0)
-# Numbers of which one source or none tells (assumed): height of the thrust line, +-0.1 m; the delay of the downwash
-TOLD_ONCE = {"engine_arm_z": 0.33, "Cm_alphadot": 0.1}
+# Numbers of which one source or none tells (assumed): height of the thrust line, +-0.15 m; the delay of the downwash
+TOLD_ONCE = {"engine_arm_z": 0.5, "Cm_alphadot": 0.1}
 # What a calibrated installation is off by, in the channel's unit (assumed)
 CALIBRATION = {"bias_airspeed": 0.2, "bias_alpha": 1.5e-3, "bias_beta": 1.5e-3, "bias_p": 3e-4, "bias_q": 3e-4,
                "bias_r": 3e-4, "bias_phi": 1.5e-3, "bias_theta": 1.5e-3, "bias_ax": 0.015, "bias_ay": 0.015,
