@@ -9,7 +9,7 @@ import pytest
 from scipy import signal
 
 from testbed.commands.benchmark import GUSTS
-from testbed.withheld import draw, gusts
+from testbed.withheld import draw, gusts, separation
 from testbed.withheld import plant as pl
 from testbed.withheld.conditions import KINDS, Conditions
 from testbed.withheld.distance import whitener
@@ -86,3 +86,11 @@ def test_a_mixed_set_meets_every_kind_in_turn_and_is_else_the_same():
 
 def test_the_command_offers_every_kind():
     assert list(GUSTS) == [*KINDS, "mixed"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_distances_of_an_effect_are_measured_in_every_kind(kind):
+    shape = separation.geometry(0, 1.0, Conditions(0.5, 1.0, 1.0, kind))
+    found = separation.distances(0, 1.0, shape, (("elevator_power", "same", -0.3),))
+    assert 5.0 < found.none < 500.0
+    assert found.rivals["elevator_power"] < 0.01 * found.none

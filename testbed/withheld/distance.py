@@ -155,7 +155,9 @@ def whiten(w: Whitener, y: NDArray, u: NDArray, x0: NDArray | None = None) -> ND
     end = np.zeros_like(u)
     end[:-1] = u[1:]
     drive = np.einsum("ij,kjc->kic", w.mean_in, mean) + np.einsum("ij,kjc->kic", w.end_in, end)
-    x = np.zeros((27, y.shape[2])) if x0 is None else x0
+    x = np.zeros((len(w.F), y.shape[2]))  # the aircraft's states, then those of the gusts' kind
+    if x0 is not None:
+        x[: len(x0)] = x0
     arrays = [np.ascontiguousarray(a) for a in (y, drive, x, w.F, w.K, w.M, w.root)]
     return np.asarray(_filtered(*arrays)).reshape(-1, y.shape[2])
 
