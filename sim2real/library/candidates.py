@@ -27,7 +27,7 @@ from sim2real.records.reconstruct import Reconstruction
 SPREAD, MASS_SPREAD = 0.05, 0.01
 # Weak derivatives, on which sources and flights differ by 10 to 30 %: times that spread
 WEAK = dict.fromkeys(
-    ("CZ_q", "CZ_elevator", "CY_p", "CY_r", "CY_rudder", "Cl_r", "Cl_rudder", "Cn_p", "Cn_aileron"), 3.0)
+    ("CZ_q", "CZ_elevator", "CY_p", "CY_r", "CY_rudder", "Cl_r", "Cl_rudder", "Cn_p", "Cn_aileron"), 2.0)
 THRUST_SPREAD = 0.3  # of power that was not recorded and is told by the levers (assumed)
 FILTER_SPREAD = 0.1  # of the recording's cut-off: channels are in step to a few ms (assumed)
 # s, s, rad s2/m: instruments that no paper describes may as well have no lag, and no boom (assumed)
@@ -37,9 +37,9 @@ VANE_SPREAD, PITOT_SPREAD, BOOM_SPREAD = 0.008, 0.05, 1e-4
 TOLD_ONCE = {"engine_arm_z": 0.5, "Cm_alphadot": 0.1}
 VANE_SCALE = 0.015  # of a flow vane's reading, upwash included (assumed)
 # What a calibrated installation is still off by, in the channel's unit (assumed)
-CALIBRATION = {"bias_airspeed": 0.2, "bias_alpha": 1.5e-3, "bias_beta": 1.5e-3, "bias_p": 3e-4, "bias_q": 3e-4,
-               "bias_r": 3e-4, "bias_phi": 1.5e-3, "bias_theta": 1.5e-3, "bias_ax": 0.015, "bias_ay": 0.015,
-               "bias_az": 0.02}  # fmt: skip
+CALIBRATION = {"bias_airspeed": 0.1, "bias_alpha": 8e-4, "bias_beta": 8e-4, "bias_p": 2e-4, "bias_q": 2e-4,
+               "bias_r": 2e-4, "bias_phi": 8e-4, "bias_theta": 8e-4, "bias_ax": 0.008, "bias_ay": 0.008,
+               "bias_az": 0.01}  # fmt: skip
 LEAST = 0.1  # of a published value: a filter or a thrust with another sign does not fly
 NODES, FEW = 4, 2  # sizes of a parameter; and where it only has to be seen whether it is worth more
 NUISANCE_STEP = 0.1  # standard deviations at which the derivative with respect to a nuisance is taken

@@ -24,13 +24,13 @@ SHARES = {"null": 0.375, "single": 0.375, "pair": 0.125, "unknown": 0.125}
 SPREAD, MASS_RANGE = 0.05, 0.02
 # Weak derivatives, on which sources and flights differ by 10 to 30 %: times as far off among calibrated aircraft
 WEAK = dict.fromkeys(
-    ("CZ_q", "CZ_elevator", "CY_p", "CY_r", "CY_rudder", "Cl_r", "Cl_rudder", "Cn_p", "Cn_aileron"), 3.0)
+    ("CZ_q", "CZ_elevator", "CY_p", "CY_r", "CY_rudder", "Cl_r", "Cl_rudder", "Cn_p", "Cn_aileron"), 2.0)
 # Numbers of which one source or none tells (assumed): height of the thrust line, +-0.15 m; the delay of the downwash
 TOLD_ONCE = {"engine_arm_z": 0.5, "Cm_alphadot": 0.1}
 # What a calibrated installation is off by, in the channel's unit (assumed)
-CALIBRATION = {"bias_airspeed": 0.2, "bias_alpha": 1.5e-3, "bias_beta": 1.5e-3, "bias_p": 3e-4, "bias_q": 3e-4,
-               "bias_r": 3e-4, "bias_phi": 1.5e-3, "bias_theta": 1.5e-3, "bias_ax": 0.015, "bias_ay": 0.015,
-               "bias_az": 0.02}  # fmt: skip
+CALIBRATION = {"bias_airspeed": 0.1, "bias_alpha": 8e-4, "bias_beta": 8e-4, "bias_p": 2e-4, "bias_q": 2e-4,
+               "bias_r": 2e-4, "bias_phi": 8e-4, "bias_theta": 8e-4, "bias_ax": 0.008, "bias_ay": 0.008,
+               "bias_az": 0.01}  # fmt: skip
 SMALLEST, LARGEST = 0.7, 2.2  # of the typical size
 # Effects that must be larger for an ideal observer to name eight of them in 2,400 cases (`shares.py`): the spread of
 # derivatives or a near rival hides smaller ones.
