@@ -60,6 +60,7 @@ def responses(evidence: Evidence, rows: NDArray, cut: NDArray[np.intp]) -> tuple
     flight, k, first = evidence.flight, rows.shape[1] - 1, int(cut[0])
     kind = evidence.gusts.kind
     flown = Predictor(flight, np.repeat(rows[0, :1], 1 + k * len(rows)), kind=kind)
+    flown.fleet.parameters[1 : 1 + k] = held(rows[0], flight.dt, kind)[1:]  # a first size has been there before
     flown.place(0)
     left = [flown.fly(first, 0, evidence.gain.K)]
     for now, (start, end, own) in zip(rows, _stretches(cut, k), strict=True):
