@@ -16,6 +16,7 @@ from sim2real.baseline.references import Baseline
 from sim2real.flown.other_form import Bent, bring, flown_unknown
 from sim2real.flown.points import Flying
 from sim2real.flown.steps import FARTHEST, bounded_step
+from sim2real.library import candidates as library
 from sim2real.library.bends import bends, changes
 from sim2real.library.candidates import bank
 from sim2real.library.terms import BEYOND, GENERIC, GENERIC_SIZE, Term, in_common, pushes, values_of
@@ -180,11 +181,17 @@ def test_thrust_counts_as_a_coefficient(flights):
 
 @pytest.fixture(scope="module")
 def bent() -> tuple[Flying, Bent]:
-    """A flight whose pitching moment is off by a constant, ten deviations of the model's own, and nothing said."""
+    """A flight whose pitching moment is off by a constant, ten deviations of the model's own, and nothing said.
+
+    Nothing but derivatives and the vanes gives way here: no offset, and no thrust line.
+    """
     chosen = scenario.load("clear_air", duration=24.0, parameters={"turbulence_sigma_w": 0.0},
                            effects={"discrepancy": {"Cm_0": 0.02}})  # fmt: skip
     flight = in_common([reconstruct(fly(chosen, seed=3, observer=False, protection=False).record)])[0]
-    candidates = replace(bank(), families=())
+    with pytest.MonkeyPatch.context() as only:
+        for name in ("CALIBRATION", "TOLD_ONCE"):
+            only.setattr(library, name, {})
+        candidates = replace(bank(), families=())
     evidence = gather(flight, candidates)
     baseline = Baseline(load(), np.eye(len(candidates.nuisances)))
     flying = Flying([flight], candidates, [evidence], baseline, 1.0,

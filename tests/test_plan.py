@@ -62,7 +62,8 @@ def flown(effects: dict[str, dict[str, float]] | None = None, seed: int = 7) -> 
             every = next((n for mark, n in SLOW.items() if mark in meaning), 1)
             channels[name][np.arange(len(rows)) % every != 0] = np.nan
     inertia = tuple(float(model[f"inertia_{axis}"][0]) for axis in ("xx", "yy", "zz", "xz"))
-    return FlightRecord(channels, RecordMeta(name="flown", mass=float(model["mass"][0]), inertia=inertia))
+    return FlightRecord(channels, RecordMeta(name="flown", mass=float(model["mass"][0]), inertia=inertia,
+                                             sensors={"thrust": {"source": "measured"}}))
 
 
 def missed(found) -> dict[str, str]:
@@ -118,15 +119,16 @@ def test_limits_shrink_with_more_manoeuvres(elevator, lateral):
     more = plan(named([ELEVATOR, LATERAL, ELEVATOR]))
     for part in (elevator, lateral):
         assert_no_harder(more, part)
-    assert_easier(more, elevator, "elevator_gearing", "beta_bias")
+    assert_easier(more, elevator, "elevator_gearing", "elevator_lag")  # a vane's offset shows beyond its calibration
 
 
 def test_limits_agree_with_those_after_the_flight(elevator):
     after = {n: limit for n, limit in diagnose([flown()]).detection_limits.items() if limit["smallest"] is not None}
     ratio = {n: limit["smallest"] / after[n]["smallest"] for n, limit in elevator.detection_limits.items()
              if n in after and limit["parameter"] == after[n]["parameter"]}  # fmt: skip
-    for name in ("elevator_power", "static_stability", "pitch_damping", "lift_slope", "pitch_trim", "tail_ice",
-                 "wing_ice", "ice_drag", "mass_error", "cg_shift", "elevator_lag", "elevator_gearing", "alpha_bias",
+    # not of a trim: the height of the thrust line hides more of it where power rests, as it does in a plan
+    for name in ("elevator_power", "static_stability", "pitch_damping", "lift_slope", "tail_ice", "wing_ice",
+                 "ice_drag", "mass_error", "cg_shift", "elevator_lag", "elevator_gearing", "alpha_bias",
                  "airspeed_scale", "thrust_loss", "pitch_gyro_bias"):  # fmt: skip
         assert 0.75 < ratio[name] < 1.3, (name, ratio[name])
     near = [n for n, r in ratio.items() if 0.7 < r < 1.3]  # gusts excite some others, diagnose interpolates two

@@ -6,7 +6,7 @@ from testbed.withheld import draw, shares
 
 
 def test_distances_alone_tell_who_is_identifiable(monkeypatch):
-    parts = (("elevator_power", -0.25), ("rudder_power", 0.05), ("elevator_power", -0.02), ("tail_ice", 0.1))
+    parts = (("elevator_power", -0.4), ("rudder_power", 0.05), ("elevator_power", -0.02), ("tail_ice", 0.1))
     drawn = [draw.Design("single", ((name, "same", size),), 0, 1.0, 0.5, 1.3, 1.0, {}, 1) for name, size in parts]
     monkeypatch.setattr(shares, "designs", lambda cases, seed: [*drawn, draw.Design("null", (), 0, 1, 0, 1, 1, {}, 1)])
     rows = list(shares.singles(5, 0, only=("elevator_power", "rudder_power")))

@@ -11,9 +11,8 @@ from icing_env.effects.effect import Effect, Parameter, Values
 from icing_env.types import DERIVATIVE_NAMES
 
 NUMBERS = (*DERIVATIVE_NAMES, "mass", "engine_arm_z", "Cm_alphadot")
-OFFSETS = {"bias_airspeed": "m/s", "bias_alpha": "rad", "bias_beta": "rad", "bias_p": "rad/s", "bias_q": "rad/s",
-           "bias_r": "rad/s", "bias_phi": "rad", "bias_theta": "rad", "bias_ax": "m/s2", "bias_ay": "m/s2",
-           "bias_az": "m/s2"}  # fmt: skip
+OFFSETS = {"bias_airspeed": "m/s", "bias_alpha": "rad", "bias_beta": "rad", "bias_phi": "rad",
+           "bias_theta": "rad", "bias_ax": "m/s2", "bias_ay": "m/s2", "bias_az": "m/s2"}  # fmt: skip
 
 
 def apply(p: NDArray, values: Values) -> None:

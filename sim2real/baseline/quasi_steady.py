@@ -3,8 +3,8 @@
 UIUC's set and those of NASA's flights have the moment of the lagging downwash within Cm_q. The model takes it out
 (Cm_alphadot of JSBSim's aircraft, their sum kept); a simulator that was built on such a set by itself has no lag at
 all. That is another reading of the same source, and no gap: where records show a `downwash_lag` that undoes the lag,
-they are diagnosed again about a model without it, and so they are where the best explanation of a gap in pitch has
-several causes or an unknown one, of which that model may need fewer.
+they are diagnosed again about a model without it, and so they are where the best explanation has that lag among several
+causes, three of which one is in pitch, or an unknown one there, if that model then needs fewer.
 """
 
 from __future__ import annotations
@@ -34,12 +34,17 @@ def undoes_the_lag(posterior: Posterior, baseline: Baseline) -> bool:
 
 
 def worth_trying(posterior: Posterior, baseline: Baseline) -> bool:
-    """Whether a model without the lag may say it more simply: several causes, or an unknown one, some in pitch."""
+    """Whether a model without the lag may say it more simply.
+
+    Several causes with that lag among them, three with one in pitch, or something unknown there.
+    """
     best = posterior.best
-    if best.things == 0 or (best.things == 1 and best.unknown is None) or not float(baseline.parameters[NUMBER][0]):
+    if not float(baseline.parameters[NUMBER][0]):
         return False
+    if best.unknown is not None and best.unknown.component == PITCH:
+        return True
     places = {place for family in best.fit.families for place in family.effect.enters_at}
-    return PITCH in places or (best.unknown is not None and best.unknown.component == PITCH)
+    return (best.things > 1 and EFFECT in best.effects) or (best.things > 2 and PITCH in places)
 
 
 def simpler(now: Posterior, before: Posterior) -> bool:

@@ -31,6 +31,9 @@ ROUNDS, SETTLED = 10, 4.0  # flown steps, and the whitened length of one that en
 AGAIN = 2  # the round after which gust intensities are chosen anew at every step: what does not fit passes for gusts
 LONGEST = 40.0  # standard deviations that a step may move a number
 REFERENCE_SPEED = 65.0  # m/s, where a number has its value; it changes with (65/V)^2, as alpha does in level flight
+# Weak derivatives, on which sources and flights differ by 10 to 30 %: times the published spread
+WEAK = dict.fromkeys(
+    ("CZ_q", "CZ_elevator", "CY_p", "CY_r", "CY_rudder", "Cl_r", "Cl_rudder", "Cn_p", "Cn_aileron"), 3.0)
 CHANGES = 1.0  # prior standard deviation of that change at twice the dynamic pressure, in that of the value (assumed)
 # What the published spread leaves alone and another aircraft may have: standard deviations (assumed). No cubes: where
 # the references did not fly, they run away.
@@ -45,12 +48,14 @@ BEYOND: dict[str, float] = {
     "CZ_alpha2": 0.3, "Cm_alpha2": 0.1, "Cm_elevator2": 0.1, "CX_beta2": 0.1, "CZ_beta2": 0.3, "Cm_beta2": 0.1,
     "Cm_alpha_elevator": 0.1, "CZ_alpha_q": 5.0, "Cm_alpha_q": 5.0, "CY_alpha_beta": 0.1, "Cl_alpha_beta": 0.02,
     "Cn_alpha_beta": 0.02, "CY_alpha_p": 0.2, "Cl_alpha_p": 0.5, "Cn_alpha_p": 0.2, "Cl_alpha_r": 0.2,
-    "Cn_alpha_r": 0.2, "CY_alpha_rudder": 0.1, "Cn_alpha_aileron": 0.02, "Cn_alpha_rudder": 0.05}
+    "Cn_alpha_r": 0.2, "CY_alpha_rudder": 0.1, "Cn_alpha_aileron": 0.02, "Cn_alpha_rudder": 0.05,
+    # of gyros
+    "bias_p": 5e-4, "bias_q": 5e-4, "bias_r": 5e-4}
 # surfaces' paths and what is read of them
 PATHS = {"spool_time": 0.1,
          **{f"{surface}_{of}": size for surface in SURFACES for of, size in (("offset", 1e-3), ("gearing", 0.01))}}
 # alike in all flights
-INSTRUMENTS = ("scale_alpha", "scale_beta", *CALIBRATION, *PATHS)
+INSTRUMENTS = ("scale_alpha", "scale_beta", *CALIBRATION, "bias_p", "bias_q", "bias_r", *PATHS)
 STEADY = 1e-3  # the change with the flight condition of what an instrument or a path has
 # a matter of each record and its recorder
 FIXED = ("mass", "thrust", "filter_frequency", "vane_lag", "pitot_lag", "boom_gain")
@@ -125,6 +130,7 @@ def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank) -> Baselin
     """The model corrected by reference flights, and the precision with which they leave it."""
     moves, at = directions(candidates), np.array([_condition(float(np.median(f.channel("airspeed")))) for f in flights])
     fit = Fit(flights, moves, at)
+    fit.spread[: len(moves)] = [WEAK.get(move.name, 1.0) for move in moves]
     fit.run()
     return fit.baseline(candidates)
 

@@ -25,9 +25,6 @@ from sim2real.records.reconstruct import Reconstruction
 # The published sets of derivatives differ by about 5 % where they are well identified: the standard deviation of the
 # model's own uncertainty. A record's mass is known to about 1 % (assumed).
 SPREAD, MASS_SPREAD = 0.05, 0.01
-# Weak derivatives, on which sources and flights differ by 10 to 30 %: times that spread
-WEAK = dict.fromkeys(
-    ("CZ_q", "CZ_elevator", "CY_p", "CY_r", "CY_rudder", "Cl_r", "Cl_rudder", "Cn_p", "Cn_aileron"), 2.0)
 THRUST_SPREAD = 0.3  # of power that was not recorded and is told by the levers (assumed)
 FILTER_SPREAD = 0.1  # of the recording's cut-off: channels are in step to a few ms (assumed)
 # s, s, rad s2/m: instruments that no paper describes may as well have no lag, and no boom (assumed)
@@ -36,10 +33,9 @@ VANE_SPREAD, PITOT_SPREAD, BOOM_SPREAD = 0.008, 0.05, 1e-4
 # the pitch damping comes from the delay of the downwash (a quasi-steady set has it in Cm_q); assumed
 TOLD_ONCE = {"engine_arm_z": 0.5, "Cm_alphadot": 0.1}
 VANE_SCALE = 0.015  # of a flow vane's reading, upwash included (assumed)
-# What a calibrated installation is still off by, in the channel's unit (assumed)
-CALIBRATION = {"bias_airspeed": 0.1, "bias_alpha": 8e-4, "bias_beta": 8e-4, "bias_p": 2e-4, "bias_q": 2e-4,
-               "bias_r": 2e-4, "bias_phi": 8e-4, "bias_theta": 8e-4, "bias_ax": 0.008, "bias_ay": 0.008,
-               "bias_az": 0.01}  # fmt: skip
+# What a calibrated installation is still off by, in the channel's unit; gyros are zeroed at rest (assumed)
+CALIBRATION = {"bias_airspeed": 0.1, "bias_alpha": 8e-4, "bias_beta": 8e-4, "bias_phi": 8e-4, "bias_theta": 8e-4,
+               "bias_ax": 0.008, "bias_ay": 0.008, "bias_az": 0.01}  # fmt: skip
 LEAST = 0.1  # of a published value: a filter or a thrust with another sign does not fly
 NODES, FEW = 4, 2  # sizes of a parameter; and where it only has to be seen whether it is worth more
 NUISANCE_STEP = 0.1  # standard deviations at which the derivative with respect to a nuisance is taken
@@ -104,8 +100,8 @@ class Bank:
 
 
 def nuisances() -> tuple[Nuisance, ...]:
-    """Derivatives by `SPREAD` and `WEAK`, mass, what levers or one source tell, instruments and the recorder."""
-    derivatives = [Nuisance(name, name, SPREAD * WEAK.get(name, 1.0)) for name in DERIVATIVE_NAMES]
+    """Derivatives by `SPREAD`, mass, what levers or one source tell, instruments and the recorder."""
+    derivatives = [Nuisance(name, name, SPREAD) for name in DERIVATIVE_NAMES]
     guessed = Nuisance("thrust", "thrust_factor_left+thrust_factor_right", THRUST_SPREAD, only="throttle")
     known = {"vane_lag": VANE_SPREAD, "pitot_lag": PITOT_SPREAD, "boom_gain": BOOM_SPREAD}
     timing = (Nuisance("filter_frequency", "filter_frequency", FILTER_SPREAD),

@@ -22,15 +22,11 @@ SCALES = (0.75, 1.3)  # of the length of turbulence
 LEVELS = (0.5, 1.0, 1.5)  # of the published noise
 SHARES = {"null": 0.375, "single": 0.375, "pair": 0.125, "unknown": 0.125}
 SPREAD, MASS_RANGE = 0.05, 0.02
-# Weak derivatives, on which sources and flights differ by 10 to 30 %: times as far off among calibrated aircraft
-WEAK = dict.fromkeys(
-    ("CZ_q", "CZ_elevator", "CY_p", "CY_r", "CY_rudder", "Cl_r", "Cl_rudder", "Cn_p", "Cn_aileron"), 2.0)
 # Numbers of which one source or none tells (assumed): height of the thrust line, +-0.15 m; the delay of the downwash
 TOLD_ONCE = {"engine_arm_z": 0.5, "Cm_alphadot": 0.1}
 # What a calibrated installation is off by, in the channel's unit (assumed)
-CALIBRATION = {"bias_airspeed": 0.1, "bias_alpha": 8e-4, "bias_beta": 8e-4, "bias_p": 2e-4, "bias_q": 2e-4,
-               "bias_r": 2e-4, "bias_phi": 8e-4, "bias_theta": 8e-4, "bias_ax": 0.008, "bias_ay": 0.008,
-               "bias_az": 0.01}  # fmt: skip
+CALIBRATION = {"bias_airspeed": 0.1, "bias_alpha": 8e-4, "bias_beta": 8e-4, "bias_phi": 8e-4, "bias_theta": 8e-4,
+               "bias_ax": 0.008, "bias_ay": 0.008, "bias_az": 0.01}  # fmt: skip
 SMALLEST, LARGEST = 0.7, 2.2  # of the typical size
 # Effects that must be larger for an ideal observer to name eight of them in 2,400 cases (`shares.py`): the spread of
 # derivatives or a near rival hides smaller ones.
@@ -87,8 +83,8 @@ class Population(NamedTuple):
         strangers: effects of the second list alone (`strangers.py`).
         spread: of derivatives, one standard deviation.
         gusts: one of `conditions.KINDS`, or "mixed": each in turn.
-        calibrated: weak derivatives are farther off, numbers of which one source or none tells are off as well, and
-            instruments by what a calibration leaves: as in every set that is drawn today.
+        calibrated: numbers of which one source or none tells are off as well, and instruments by what a calibration
+            leaves: as in every set that is drawn today.
     """
 
     strangers: bool = False
@@ -111,7 +107,7 @@ class Population(NamedTuple):
         order = rng.permutation(len(drawn)) % len(KINDS)
         beside = [_about(1.0, TOLD_ONCE, rng) | _about(0.0, CALIBRATION, rng) if self.calibrated else {} for _ in drawn]
         larger = LARGER_STILL if self.calibrated else {}
-        spreads = {name: self.spread * (WEAK.get(name, 1.0) if self.calibrated else 1.0) for name in DERIVATIVES}
+        spreads = dict.fromkeys(DERIVATIVES, self.spread)
         return [replace(design, gusts=KINDS[k] if self.gusts == "mixed" else self.gusts,
                         baseline=wider(design.baseline, spreads) | more,
                         parts=tuple((name, form, size * larger.get(name, 1.0)) for name, form, size in design.parts))
