@@ -36,6 +36,7 @@ from sim2real.records.reconstruct import Reconstruction
 
 ANOTHER = 2.0  # times the noise that the best explanation leaves (tempering), beyond which it is not all (assumed)
 STRETCHED = 1e-5  # chance of numbers as far from published ones as those that go with it, at which it is not all, too
+ALL = 3.0  # times that square, at which numbers are the gap, whatever they leave in free flight (assumed)
 TAKEN = 0.5  # of the gap in free flight that it leaves: all numbers together leave at most that (assumed)
 SHARE = 0.6  # probability, at least, that it is they that differ where they do (assumed)
 SHOWN, PLAIN = 3.0, 2.0  # standard errors, and times its published spread, from which a number is told (assumed)
@@ -113,13 +114,13 @@ def incomplete(posterior: Posterior, precision: FloatArray, flown: gap.Energy, a
     left = gap.g(flown.after, flown.alone) >= gap.null_quantile(flown.alone)
     if posterior.tempering > ANOTHER:
         return left or not all_of_it or posterior.settled is None or _stretched(posterior, precision)
-    return left and all_of_it and _stretched(posterior, precision)
+    return (left and all_of_it and _stretched(posterior, precision)) or _stretched(posterior, precision, ALL)
 
 
-def _stretched(posterior: Posterior, precision: FloatArray) -> bool:
+def _stretched(posterior: Posterior, precision: FloatArray, times: float = 1.0) -> bool:
     """Whether the numbers that go with the best explanation are farther from published ones than any aircraft's."""
     settled = posterior.settled
-    return settled is not None and float(settled @ precision @ settled) > chi2.isf(STRETCHED, len(settled))
+    return settled is not None and float(settled @ precision @ settled) > times * chi2.isf(STRETCHED, len(settled))
 
 
 def takes_most(before: gap.Energy, fitted: gap.Energy) -> bool:
