@@ -107,9 +107,8 @@ class Population(NamedTuple):
         order = rng.permutation(len(drawn)) % len(KINDS)
         beside = [_about(1.0, TOLD_ONCE, rng) | _about(0.0, CALIBRATION, rng) if self.calibrated else {} for _ in drawn]
         larger = LARGER_STILL if self.calibrated else {}
-        spreads = dict.fromkeys(DERIVATIVES, self.spread)
         return [replace(design, gusts=KINDS[k] if self.gusts == "mixed" else self.gusts,
-                        baseline=wider(design.baseline, spreads) | more,
+                        baseline=wider(design.baseline, self.spread) | more,
                         parts=tuple((name, form, size * larger.get(name, 1.0)) for name, form, size in design.parts))
                 for design, k, more in zip(drawn, order, beside, strict=True)]
 
@@ -186,10 +185,11 @@ def _target(rng: np.random.Generator) -> float:
     return float(low * (high / low) ** rng.random())
 
 
-def wider(baseline: Mapping[str, float], spreads: Mapping[str, float]) -> dict[str, float]:
-    """The same aircraft with derivatives that are off by as many deviations of other spreads."""
-    times = {name: spread / SPREAD for name, spread in spreads.items() if spread != SPREAD}
-    return {name: 1.0 + (factor - 1.0) * times[name] if name in times else factor
+def wider(baseline: Mapping[str, float], spread: float) -> dict[str, float]:
+    """The same aircraft with derivatives that are off by as many deviations of another spread."""
+    if spread == SPREAD:
+        return dict(baseline)
+    return {name: 1.0 + (factor - 1.0) * spread / SPREAD if name in DERIVATIVES else factor
             for name, factor in baseline.items()}  # fmt: skip
 
 
