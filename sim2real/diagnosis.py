@@ -36,6 +36,7 @@ from sim2real.records.instruments import with_recorder
 from sim2real.records.late_power import prompt
 from sim2real.records.reconstruct import Reconstruction, reconstruct
 from sim2real.records.side_by_side import algebra_in_one_thread
+from sim2real.records.thrust_source import as_measured, differs
 from sim2real.records.vane_lead import met_together
 from sim2real.rollout import Rollout, flying_as
 from sim2real.signatures.evidence import Evidence, typical
@@ -100,6 +101,8 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         InputError: no records, an unknown effect in `without`, or a record that cannot be used.
     """
     began = time.perf_counter()
+    if differs([*records, *held_out], reference):
+        records, held_out, reference = (as_measured(some) for some in (records, held_out, reference))
     at_hand = _at_hand(records, held_out, reference, tuple(without), simulator, progress)
     at_hand, weighed = _weighed(at_hand, records, held_out, not (reference or simulator), progress)
     flights, others, candidates = at_hand.flights, at_hand.others, at_hand.candidates
@@ -183,7 +186,7 @@ def _weighed(at_hand: _AtHand, records: Sequence[FlightRecord], held_out: Sequen
     """What the records say about a model; `published`: about the published one, which may be read as quasi-steady."""
     first = fit(at_hand.flights, at_hand.candidates, at_hand.untestable, at_hand.baseline, progress)
     plain = published and undoes_the_lag(first[1], at_hand.baseline)
-    if not plain and not (published and worth_trying(first[1], at_hand.baseline)):
+    if not plain and not (published and worth_trying(first[1], at_hand.baseline, at_hand.candidates)):
         return at_hand, first
     progress("weighing again about an aircraft whose downwash does not lag")
     other = _over(without_lag(at_hand.baseline), at_hand, records, held_out)

@@ -49,6 +49,14 @@ def test_the_kind_of_gusts_is_told(sigma, kind):
     assert gain.sigma == pytest.approx(sigma, rel=0.25)
 
 
+@pytest.mark.parametrize(("kind", "taken_for"), [(KINDS[1], KINDS[3]), (KINDS[3], KINDS[1])])
+def test_weak_gusts_that_turn_the_air_are_not_kept_for_another_such_kind(kind, taken_for):
+    """That the air turns was paid for: which of both kinds it is, the likelihood says."""
+    flight = reconstruct(flown(5, 0.35, kind))
+    (gain,) = likeliest_explained([flight], [choose_gain(flight, SIGMAS, (), taken_for)], [()])
+    assert gain.gusts.kind == kind
+
+
 def test_the_gusts_of_all_records_are_of_the_kind_that_most_of_them_say():
     """One record by itself is sometimes wrong: here it is one whose air turns in truth."""
     flights = [reconstruct(flown(5 + k, 1.0, KINDS[k == 0])) for k in range(3)]

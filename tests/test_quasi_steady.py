@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from functools import cache
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from icing_env import scenario
 from icing_env.aircraft import load
 from icing_env.effects import with_effects
 from icing_env.record import FlightRecord
-from sim2real.baseline.quasi_steady import NOTE
+from sim2real.baseline.quasi_steady import NOTE, NUMBER, without_lag, worth_trying
+from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import diagnose
+from sim2real.library.candidates import bank
+from sim2real.posterior.hypotheses import Hypothesis, Settled
+from sim2real.posterior.sets import SetFit
 from testbed.flight import fly
 
 
@@ -45,3 +51,17 @@ def test_what_else_it_has_is_told_alone_and_the_command_flies_both():
 def test_half_a_lag_is_a_gap_as_before():
     found = diagnose([flown(0.5, 0.5)])
     assert found.hypotheses[0]["effects"] == ["downwash_lag"] and not noted(found)
+
+
+@pytest.mark.parametrize(("deviations", "effect", "worth"), [
+    (-3.5, "pitch_trim", True), (-2.5, "pitch_trim", False), (3.5, "pitch_trim", False), (-3.5, None, False),
+])  # fmt: skip
+def test_a_trim_that_needs_less_lag_than_is_believed_is_weighed_without_it(deviations, effect, worth):
+    candidates = bank()
+    nuisances = np.zeros(len(candidates.nuisances))
+    nuisances[[n.name for n in candidates.nuisances].index(NUMBER)] = deviations
+    families = tuple(f for f in candidates.families if f.effect.name == effect)[:1]
+    best = Hypothesis(SetFit(families), None, 0.0, 0.0, settled=Settled(nuisances, np.eye(len(nuisances))))
+    baseline = Baseline(load(), np.eye(len(nuisances)))
+    assert worth_trying(SimpleNamespace(best=best), baseline, candidates) == worth
+    assert not worth_trying(SimpleNamespace(best=best), without_lag(baseline), candidates)

@@ -4,7 +4,8 @@ UIUC's set and those of NASA's flights have the moment of the lagging downwash w
 (Cm_alphadot of JSBSim's aircraft, their sum kept); a simulator that was built on such a set by itself has no lag at
 all. That is another reading of the same source, and no gap: where records show a `downwash_lag` that undoes the lag,
 they are diagnosed again about a model without it, and so they are where the best explanation has that lag among several
-causes, three of which one is in pitch, or an unknown one there, if that model then needs fewer.
+causes, three of which one is in pitch, an unknown one there, or needs less of that lag than it is believed to be
+uncertain by, if that model then needs fewer.
 """
 
 from __future__ import annotations
@@ -13,11 +14,13 @@ from dataclasses import replace
 
 from icing_env import aircraft
 from sim2real.baseline.references import Baseline
+from sim2real.library.candidates import Bank
 from sim2real.posterior.hypotheses import Posterior
 from sim2real.records.reconstruct import Reconstruction
 
 EFFECT, NUMBER, PITCH = "downwash_lag", "Cm_alphadot", "pitching_moment"
 UNDONE, KNOWN = 0.15, 0.1  # share of the lag that may be left, and to which the records tell it (assumed)
+FAR = -3.0  # deviations of that number, below which an explanation needs less lag than is believed (assumed)
 NOTE = "the downwash does not lag, as in a quasi-steady set of derivatives taken by itself: no gap"
 
 
@@ -33,16 +36,20 @@ def undoes_the_lag(posterior: Posterior, baseline: Baseline) -> bool:
     return left < UNDONE * published and error < KNOWN * published
 
 
-def worth_trying(posterior: Posterior, baseline: Baseline) -> bool:
+def worth_trying(posterior: Posterior, baseline: Baseline, candidates: Bank) -> bool:
     """Whether a model without the lag may say it more simply.
 
-    Several causes with that lag among them, three with one in pitch, or something unknown there.
+    Several causes with that lag among them, three with one in pitch, something unknown there, or much less lag.
     """
     best = posterior.best
     if not float(baseline.parameters[NUMBER][0]):
         return False
     if best.unknown is not None and best.unknown.component == PITCH:
         return True
+    if best.things and best.settled is not None:
+        uncertain = [nuisance.name for nuisance in candidates.nuisances]
+        if best.settled.nuisances[uncertain.index(NUMBER)] < FAR:
+            return True
     places = {place for family in best.fit.families for place in family.effect.enters_at}
     return (best.things > 1 and EFFECT in best.effects) or (best.things > 2 and PITCH in places)
 

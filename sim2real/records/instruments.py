@@ -137,6 +137,8 @@ def declared(row: NDArray, record: FlightRecord, values: dict[str, FloatArray], 
         values["beta"] = values["beta"] + (extra * rate(values["beta"], dt, abs(extra)) if extra else 0.0)
     if "bending" in _table(sensors, "alpha"):
         row["boom_gain"] = known.bending
+    if _table(sensors, "thrust").get("found"):
+        notes.append("thrust taken as measured: it is another function of torque and airspeed than in the references")
     _recorder(row, sensors, dt, notes)
 
 

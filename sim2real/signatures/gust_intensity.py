@@ -114,7 +114,8 @@ def _in_favour(flight: Reconstruction, found: Gain, pushed: Sequence[Push]) -> l
         if (gain_of := gained(gain)) > 0.0:
             gain = choose_gain(flight, SIGMAS, pushed, kind)
             gain_of = gained(gain)
-        out.append(min(gain_of, 0.0) if gain.sigma == SIGMAS[-1] and kind != LATER else gain_of - asked(gain))
+        stay = 0.5 if kind.rotation and found.gusts.kind.rotation else 1.0  # that it turns was paid for
+        out.append(min(gain_of, 0.0) if gain.sigma == SIGMAS[-1] and kind != LATER else gain_of - stay * asked(gain))
     return out
 
 

@@ -108,10 +108,11 @@ def without_levers(text: str) -> str:
 
 
 def side_text(flight: str, role: str, papers: Papers) -> str:
-    """The TOML beside a record: JSBSim's own mass, inertia and geometry."""
+    """The TOML beside a record: JSBSim's own mass, inertia and geometry; thrust is JSBSim's own, changes included."""
     return "\n".join([
         'aircraft = "dhc6"', f'flight = "{flight}"', f'role = "{role}"', f"mass = {papers.mass}",
-        "cg = [0.0, 0.0, 0.0]", "", "[inertia]", *(f"{a} = {v}" for a, v in papers.inertia.items()), "",
+        "cg = [0.0, 0.0, 0.0]", "", "[sensors.thrust]", 'source = "measured"', "",
+        "[inertia]", *(f"{a} = {v}" for a, v in papers.inertia.items()), "",
         "[geometry]", f"wing_area = {papers.wing_area}", f"span = {papers.span}", f"chord = {papers.chord}", ""])
 
 
