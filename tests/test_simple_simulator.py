@@ -1,8 +1,8 @@
 """Records as a simple simulator of another house would make them, built on the same published derivatives.
 
 Its plant is the benchmark's own. Where published facts are silent it has other numbers than our aircraft file: servos,
-the height of the thrust line; its derivatives are quasi-steady; it writes thrust and no torque, and the gusts meet all
-of the aircraft at once. Nothing of that is a gap.
+the height of the thrust line; its slipstream does nothing, its derivatives are quasi-steady; it writes thrust and no
+torque, and the gusts meet all of the aircraft at once. Nothing of that is a gap.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ import pytest
 from testbed.benchmarks.diagnosis import solve
 from testbed.withheld import draw, files, generate
 
-OWN = {"Cm_alphadot": 0.0, "engine_arm_z": 0.0, **{f"{s}_lag": 2.0 for s in ("elevator", "aileron", "rudder")}}
+OWN = {"Cm_alphadot": 0.0, "engine_arm_z": 0.0, "CZ_CT": 0.0, "Cm_elevator_CT": 0.0,
+       **{f"{s}_lag": 2.0 for s in ("elevator", "aileron", "rudder")}}
 UNWRITTEN = ("torque", "rpm")
 
 
@@ -44,7 +45,7 @@ def _as_there(name: str, text: str) -> str:
 @pytest.mark.parametrize(("sigma", "gusts", "seed"), [
     pytest.param(0.0, "later", 0, marks=pytest.mark.slow), (0.5, "at_once", 3),
     pytest.param(1.5, "later", 2, marks=pytest.mark.slow), pytest.param(1.5, "at_once", 4, marks=pytest.mark.slow),
-    pytest.param(0.5, "rolling", 5, marks=pytest.mark.slow),
+    pytest.param(0.5, "rolling", 5, marks=pytest.mark.slow), pytest.param(0.5, "turning", 6, marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_its_clean_aircraft_has_no_gap(tmp_path, sigma, gusts, seed):
     found = solve(case(tmp_path / "case", sigma, gusts, seed))

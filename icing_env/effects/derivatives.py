@@ -1,4 +1,4 @@
-"""The aircraft's own numbers: derivatives, mass and thrust line, so much of the model's, and offsets of instruments.
+"""The aircraft's own numbers, so much of the model's: derivatives, mass, thrust line, slipstream; and offsets.
 
 Published derivatives are off by some 5 % in any aircraft, and a calibration leaves its instruments off by something; a
 diagnosis fits both beside the effects that it looks for. Like `discrepancy` this belongs to no library: it explains
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from icing_env.effects.effect import Effect, Parameter, Values
 from icing_env.types import DERIVATIVE_NAMES
 
-NUMBERS = (*DERIVATIVE_NAMES, "mass", "engine_arm_z", "Cm_alphadot")
+NUMBERS = (*DERIVATIVE_NAMES, "mass", "engine_arm_z", "CZ_CT", "Cm_elevator_CT", "Cm_alphadot")
 OFFSETS = {"bias_airspeed": "m/s", "bias_alpha": "rad", "bias_beta": "rad", "bias_phi": "rad",
            "bias_theta": "rad", "bias_ax": "m/s2", "bias_ay": "m/s2", "bias_az": "m/s2"}  # fmt: skip
 
@@ -26,7 +26,7 @@ EFFECT = Effect(
     name="derivatives",
     component="aerodynamics",
     enters_at=("x_force", "y_force", "z_force", "rolling_moment", "pitching_moment", "yawing_moment", "mass"),
-    description="Derivatives, mass and thrust line, by what part of the model's; offsets of channels",
+    description="Derivatives, mass, thrust line and slipstream, by what part of the model's; offsets of channels",
     source="docs/model.md, section 20",
     parameters=(*(Parameter(name, "1", neutral=0.0, typical=0.0, low=-1.0, high=10.0) for name in NUMBERS),
                 *(Parameter(name, unit, neutral=0.0, typical=0.0, low=-10.0, high=10.0)

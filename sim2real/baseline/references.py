@@ -42,8 +42,8 @@ BEYOND: dict[str, float] = {
     "CY_aileron": 3e-3, "Cl_q": 0.02, "Cn_q": 0.02, "Cm_p": 0.05, "Cm_r": 0.05,
     "thrust_factor_left+thrust_factor_right": 0.02,
     # with thrust
-    "Cm_CT": 0.02, "CZ_CT": 0.02, "Cl_CT": 1e-3, "Cn_CT": 1e-3, "Cm_elevator_CT": 0.06, "CZ_alpha_CT": 0.3,
-    "Cm_alpha_CT": 0.1, "Cn_alpha_CT": 0.02, "CY_beta_CT": 0.1, "Cl_beta_CT": 0.02, "Cn_beta_CT": 0.02,
+    "Cm_CT": 0.02, "Cl_CT": 1e-3, "Cn_CT": 1e-3, "CZ_alpha_CT": 0.3, "Cm_alpha_CT": 0.1, "Cn_alpha_CT": 0.02,
+    "CY_beta_CT": 0.1, "Cl_beta_CT": 0.02, "Cn_beta_CT": 0.02,
     # of second order
     "CZ_alpha2": 0.3, "Cm_alpha2": 0.1, "Cm_elevator2": 0.1, "CX_beta2": 0.1, "CZ_beta2": 0.3, "Cm_beta2": 0.1,
     "Cm_alpha_elevator": 0.1, "CZ_alpha_q": 5.0, "Cm_alpha_q": 5.0, "CY_alpha_beta": 0.1, "Cl_alpha_beta": 0.02,

@@ -29,9 +29,10 @@ THRUST_SPREAD = 0.3  # of power that was not recorded and is told by the levers 
 FILTER_SPREAD = 0.1  # of the recording's cut-off: channels are in step to a few ms (assumed)
 # s, s, rad s2/m: instruments that no paper describes may as well have no lag, and no boom (assumed)
 VANE_SPREAD, PITOT_SPREAD, BOOM_SPREAD = 0.008, 0.05, 1e-4
-# Numbers of which one source or none tells: heights of thrust line and c.g. (0.15 m of 0.3), and what part of
-# the pitch damping comes from the delay of the downwash (a quasi-steady set has it in Cm_q); assumed
-TOLD_ONCE = {"engine_arm_z": 0.5, "Cm_alphadot": 0.1}
+# Numbers of which one source or none tells: heights of thrust line and c.g. (0.15 m of 0.3), what the slipstream does
+# to lift and to the elevator (a simulator built on a published set has neither), and what part of the pitch damping
+# comes from the delay of the downwash (a quasi-steady set has it in Cm_q); assumed
+TOLD_ONCE = {"engine_arm_z": 0.5, "CZ_CT": 0.5, "Cm_elevator_CT": 0.5, "Cm_alphadot": 0.1}
 VANE_SCALE = 0.015  # of a flow vane's reading, upwash included (assumed)
 # What a calibrated installation is still off by, in the channel's unit; gyros are zeroed at rest (assumed)
 CALIBRATION = {"bias_airspeed": 0.1, "bias_alpha": 8e-4, "bias_beta": 8e-4, "bias_phi": 8e-4, "bias_theta": 8e-4,

@@ -22,8 +22,9 @@ SCALES = (0.75, 1.3)  # of the length of turbulence
 LEVELS = (0.5, 1.0, 1.5)  # of the published noise
 SHARES = {"null": 0.375, "single": 0.375, "pair": 0.125, "unknown": 0.125}
 SPREAD, MASS_RANGE = 0.05, 0.02
-# Numbers of which one source or none tells (assumed): height of the thrust line, +-0.15 m; the delay of the downwash
-TOLD_ONCE = {"engine_arm_z": 0.5, "Cm_alphadot": 0.1}
+# Numbers of which one source or none tells (assumed): height of the thrust line, +-0.15 m; what the slipstream does to
+# lift and to the elevator; the delay of the downwash
+TOLD_ONCE = {"engine_arm_z": 0.5, "CZ_CT": 0.5, "Cm_elevator_CT": 0.5, "Cm_alphadot": 0.1}
 # What a calibrated installation is off by, in the channel's unit (assumed)
 CALIBRATION = {"bias_airspeed": 0.1, "bias_alpha": 8e-4, "bias_beta": 8e-4, "bias_phi": 8e-4, "bias_theta": 8e-4,
                "bias_ax": 0.008, "bias_ay": 0.008, "bias_az": 0.01}  # fmt: skip
