@@ -26,7 +26,7 @@ DIFFERS, ERRORS = 0.03, 4.0  # by how much charts have to differ, as a share and
 def as_measured(records: Sequence[FlightRecord]) -> list[FlightRecord]:
     """Records that do not declare where thrust comes from declare it measured."""
     found = {"thrust": {"source": "measured", "found": True}}
-    return [replace(r, meta=replace(r.meta, sensors=found | r.meta.sensors)) for r in records]
+    return [replace(r, meta=replace(r.meta, sensors={**found, **r.meta.sensors})) for r in records]
 
 
 def differs(records: Sequence[FlightRecord], others: Sequence[FlightRecord]) -> bool:
