@@ -66,3 +66,11 @@ def test_a_component_counts_terms_and_course_and_tells_the_likelier():
     assert [u.terms[0][0] for u in found] == ["course", "1"]
     assert found[0].log_evidence == pytest.approx(np.log(2.0 / 3.0 * np.exp(2.0) + np.exp(9.0) / 3.0))
     assert found[1].log_evidence == pytest.approx(1.0 + np.log(2.0 / 3.0))
+
+
+@pytest.mark.parametrize(("course", "told"), [(3015.0, "airspeed"), (3060.0, "course")])
+def test_of_ways_that_say_a_large_gap_nearly_as_well_terms_are_told_and_all_are_counted(course, told):
+    terms = UnknownFit("x_force", 3000.0, (("airspeed", 1.0, 0.1),), 10.0, {})
+    (found,) = with_courses([terms], [replace(terms, log_evidence=course, terms=(("course", 1.0, 0.1),))])
+    assert found.terms[0][0] == told
+    assert found.log_evidence == pytest.approx(course + np.log(1.0 / 3.0))

@@ -20,6 +20,7 @@ from sim2real.library.candidates import Nuisance
 CENTRE, INERTIA = 0.01, 0.02  # m forward; share: how well a loading is known (assumed: half a per cent of the chord)
 ALIKE = 2e-3  # share of the mass up to which two loadings are one
 AXES = ("Cl_", "Cm_", "Cn_")
+RATIO = "Cm_elevator_CT"  # of two moments of one loading
 
 
 def otherwise_loaded(references: Iterable[FlightRecord], records: Iterable[FlightRecord]) -> bool:
@@ -42,7 +43,7 @@ def _moves(row: NDArray, nuisances: Sequence[Nuisance]) -> FloatArray:
     p, out = row[0], np.zeros((1 + len(AXES), len(nuisances)))
     for j, nuisance in enumerate(nuisances):
         axis, _, of = nuisance.parameter.partition("_")
-        if nuisance.absolute or f"{axis}_" not in AXES:
+        if nuisance.absolute or f"{axis}_" not in AXES or nuisance.parameter == RATIO:
             continue
         out[1 + AXES.index(f"{axis}_"), j] = INERTIA / nuisance.factor
         size = nuisance.factor * float(p[nuisance.parameter])

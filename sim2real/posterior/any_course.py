@@ -21,6 +21,7 @@ from sim2real.signatures.courses import Course, Courses, Remainder, in_time
 
 SIZES = (0.003, 0.01, 0.03, 0.1, 0.3)  # standard deviations of the heights, in units of a generic coefficient (assumed)
 SHARE = 1.0 / 3.0  # prior share of what is unknown at a component that generic terms do not follow (assumed)
+ALIKE = 0.01  # of what generic terms gain, that another way has to gain beyond them to be told instead (assumed)
 TOGETHER, MOST = 7, 5e8  # components whose responses are computed at once, and bytes that these may take
 GUSTY = 0.3  # m/s of gusts, in which a course of the wind counts half (set on clean aircraft)
 PLACES = in_time({component for component, _, _ in (*GENERIC, *BEYOND)})
@@ -108,7 +109,11 @@ def _fit(component: str, inner: FloatArray, onto: FloatArray, misfit: float) -> 
 
 
 def with_courses(fits: Sequence[UnknownFit], courses: Sequence[UnknownFit]) -> list[UnknownFit]:
-    """Generic terms of every component, or a free course or a delay there: all counted, the likeliest told."""
+    """Generic terms of every component, or a free course or a delay there: all counted, the likeliest told.
+
+    Of ways that say it nearly as well, terms are told: what errors of the model's own make of so large a gap is no
+    evidence against them, and a course foretells nothing of another flight.
+    """
     out = []
     for u in fits:
         free = [course for course in courses if course.component == u.component]
@@ -116,5 +121,7 @@ def with_courses(fits: Sequence[UnknownFit], courses: Sequence[UnknownFit]) -> l
         ways = [replace(u, log_evidence=u.log_evidence + float(np.log(1.0 - SHARE))),
                 *(replace(way, log_evidence=way.log_evidence + float(np.log(share))) for way in free)]
         together = float(np.logaddexp.reduce([way.log_evidence for way in ways]))
-        out.append(replace(max(ways, key=lambda way: way.log_evidence), log_evidence=together))
+        best = max(ways, key=lambda way: way.log_evidence)
+        told = best if best.log_evidence - ways[0].log_evidence > ALIKE * max(u.log_evidence, 0.0) else ways[0]
+        out.append(replace(told, log_evidence=together))
     return out
