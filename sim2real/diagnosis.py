@@ -101,7 +101,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         InputError: no records, an unknown effect in `without`, or a record that cannot be used.
     """
     began = time.perf_counter()
-    if differs([*records, *held_out], reference):
+    if reference and differs([*records, *held_out], reference):
         records, held_out, reference = (as_measured(some) for some in (records, held_out, reference))
     at_hand = _at_hand(records, held_out, reference, tuple(without), simulator, progress)
     at_hand, weighed = _weighed(at_hand, records, held_out, not (reference or simulator), progress)
