@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -144,6 +145,7 @@ def answer(found: Diagnosis) -> dict[str, Any]:
 def show(found: Diagnosis, result: dict[str, Any]) -> None:
     """The verdict in plain sentences, then the evidence as tables."""
     from sim2real.words import of_the_model, sentences
+    from testbed.reports.given import taken_as_given
 
     for sentence in sentences(found):
         click.echo(sentence)
@@ -179,8 +181,11 @@ def show(found: Diagnosis, result: dict[str, Any]) -> None:
         click.echo("Not testable: " + "; ".join(f"{n['effect']} ({n['why']})" for n in result["not_testable"]))
     if told := of_the_model(found):
         click.echo(told)
-    for problem in result["data_problems"]:
-        click.echo(f"Record: {problem['channel']} {problem['kind']}")
+    if given := taken_as_given(found.provenance):
+        click.echo("Taken as given: " + "; ".join(note for note, _ in given))
+    problems = Counter((problem["channel"], problem["kind"]) for problem in result["data_problems"])
+    for (channel, kind), count in problems.items():
+        click.echo(f"Record: {channel} {kind}" + (f" ({count} times)" if count > 1 else ""))
 
 
 def show_unknown(unknown: dict[str, Any]) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from icing_env.effects.derivatives import OFFSETS
 from icing_env.record import FloatArray
 from sim2real.actuators.paths import driven
 from sim2real.closing import gap
@@ -20,6 +21,7 @@ from sim2real.where import stretches
 from sim2real.words import listed, of_the_model, sentences, term_named
 from testbed.commands.common import plain
 from testbed.reports.diagnosis_figures import bars, heat, ladder_gaps, regime_heat, size_histories
+from testbed.reports.given import taken_as_given
 from testbed.reports.page import Report
 from testbed.reports.plot_style import scale_of
 from testbed.reports.plotting import gap_bars, time_histories
@@ -53,6 +55,7 @@ def build(found: Diagnosis, result: Mapping[str, Any]) -> Report:
     _where(report, found, result)
     _closing(report, found, result)
     _limits(report, result)
+    _given(report, result)
     return report
 
 
@@ -174,11 +177,20 @@ def _closing(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> Non
     report.figure(time_histories(series, channels, {"record": "truth", "before": "iced", "after": "protected"}),
                   f"The first {what} record and its free simulation, restarted every 10 s.")
     if model := result["resimulate"]["model"]:
-        report.table(["number", "changed by", "standard error"],
-                     [[name, f"{100.0 * own['change']:+.1f} %", f"{100.0 * own['std_error']:.1f} %"]
-                      for name, own in sorted(model.items(), key=lambda item: -abs(item[1]["change"]))],
-                     "The model's own numbers as they settled beside the explanation, flown with it: change of each. A "
-                     "standard error of 5 % (mass: 1 %) means that these records say nothing of it.")
+        report.table(["number", "changed by", "standard error"], own_numbers(model),
+                     "The model's own numbers as they settled beside the explanation, flown with it: change of each, "
+                     "what the records say most of first. Where a standard error is as large as the number was thought "
+                     "to be uncertain (a derivative: 5 %, mass: 1 %) they say nothing of it.")
+
+
+def own_numbers(model: Mapping[str, Mapping[str, float]]) -> list[list[Any]]:
+    """Name, change and standard error of each: parts of the number, of offsets in their channel's unit."""
+    rows = []
+    for name, own in sorted(model.items(), key=lambda item: -abs(item[1]["change"]) / max(item[1]["std_error"], 1e-12)):
+        change, error = own["change"], own["std_error"]
+        rows.append([name, f"{change:+.2g} {OFFSETS[name]}", f"{error:.2g} {OFFSETS[name]}"] if name in OFFSETS else
+                    [name, f"{100.0 * change:+.1f} %", f"{100.0 * error:.1f} %"])  # fmt: skip
+    return rows
 
 
 def _ladder(report: Report, ladder: Mapping[str, Any]) -> None:
@@ -201,6 +213,15 @@ def _limits(report: Report, result: Mapping[str, Any]) -> None:
     report.table(["effect", "parameter", "smallest", "unit"], limits, "Detection limits.")
     if result["not_testable"]:
         report.table(["effect", "why"], [[n["effect"], n["why"]] for n in result["not_testable"]], "Not testable.")
+
+
+def _given(report: Report, result: Mapping[str, Any]) -> None:
+    if not (given := taken_as_given(result["provenance"])):
+        return
+    report.section("What was taken as given",
+                   "What the records and their side files do not tell, and what was found of the instruments first. Of "
+                   "records that differ in the numbers alone, the first one's; a side file can say otherwise.")
+    report.table(["of the records", "in how many"], [[note, count] for note, count in given], "Taken as given.")
 
 
 def _label(hypothesis: Mapping[str, Any]) -> str:
