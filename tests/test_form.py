@@ -216,6 +216,19 @@ def test_a_scale_is_a_function_of_its_own_reading_and_a_bias_of_none():
     assert not calibration("static_stability", bent, raw)
 
 
+def test_an_offset_that_drifts_is_the_bias_though_a_calibration_leaves_most_of_its_mean():
+    rows = {term.name: term.row for term in bank().terms if term.component == "sensor:beta"}
+    raw = np.eye(max(rows.values()) + 1)
+    drift, other = (UnknownFit("sensor:beta", 4000.0, tuple((name, w, 0.1) for name, w in terms), 0.0,
+                               {rows[name]: w for name, w in terms})
+                    for terms in ((("time", 1.0), ("1", 1.0), ("alpha", 0.3)), (("alpha", 1.0), ("1", 0.3))))
+    families = tuple(f for f in bank().families if f.effect.name == "beta_bias")[:1]
+    bias = Hypothesis(SetFit(families, weights={}), None, 0.0, 0.0)
+    for explained in (250.0, -40.0):  # of 8000: the rest of the mean is taken for what a calibration leaves
+        assert is_home(bias, drift, 8000.0, explained, raw)
+        assert not is_home(bias, other, 8000.0, explained, raw)
+
+
 def test_what_small_commands_lose_is_no_form_of_a_gearing():
     rows = {term.name: term.row for term in bank().terms if term.component == "aileron_path"}
     raw = np.eye(max(rows.values()) + 1)

@@ -12,10 +12,11 @@ from icing_env import scenario
 from icing_env.aircraft import load
 from icing_env.effects import with_effects
 from icing_env.record import FlightRecord
-from sim2real.baseline.quasi_steady import NOTE, NUMBER, without_lag, worth_trying
+from sim2real.baseline.quasi_steady import NOTE, NUMBER, simpler, without_lag, worth_trying
 from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import diagnose
 from sim2real.library.candidates import bank
+from sim2real.posterior.generic import UnknownFit
 from sim2real.posterior.hypotheses import Hypothesis, Settled
 from sim2real.posterior.sets import SetFit
 from testbed.flight import fly
@@ -65,3 +66,19 @@ def test_a_trim_that_needs_less_lag_than_is_believed_is_weighed_without_it(devia
     baseline = Baseline(load(), np.eye(len(nuisances)))
     assert worth_trying(SimpleNamespace(best=best), baseline, candidates) == worth
     assert not worth_trying(SimpleNamespace(best=best), without_lag(baseline), candidates)
+
+
+@pytest.mark.parametrize(("now", "before", "believed"), [
+    ("elevator_power", (), True), ((), ("elevator_power",), True), ("downwash_lag", (), False),
+])  # fmt: skip
+def test_a_model_without_the_lag_is_not_believed_where_an_explanation_puts_it_back(now, before, believed):
+    """About the model with it something unknown, about the other `downwash_lag`: the aircraft has the lag."""
+    def told(effects: tuple[str, ...] | str) -> SimpleNamespace:
+        names = (effects,) if isinstance(effects, str) else effects
+        families = tuple(next(f for f in bank().families if f.effect.name == name) for name in names)
+        unknown = None if isinstance(effects, str) or not names else UnknownFit("pitching_moment", 1.0, (), 0.0, {})
+        return SimpleNamespace(best=Hypothesis(SetFit(families), unknown, 0.0, 0.0))
+
+    first = told(before) if before else SimpleNamespace(
+        best=Hypothesis(SetFit(), UnknownFit("pitching_moment", 1.0, (), 0.0, {}), 0.0, 0.0))
+    assert simpler(told(now), first) == believed

@@ -55,9 +55,12 @@ def worth_trying(posterior: Posterior, baseline: Baseline, candidates: Bank) -> 
 
 
 def simpler(now: Posterior, before: Posterior) -> bool:
-    """Whether the best explanation has fewer causes, or as many and no unknown one any more."""
+    """Whether the best explanation has fewer causes, or as many and no unknown one any more.
+
+    None that puts the lag back: an aircraft that has it is told about the model that has it.
+    """
     known = now.best.unknown is None and before.best.unknown is not None
-    return now.best.things < before.best.things + known
+    return EFFECT not in now.best.effects and now.best.things < before.best.things + known
 
 
 def without_lag(baseline: Baseline) -> Baseline:

@@ -50,6 +50,12 @@ def scales(effect: Effect) -> str:
     return _alone(effect, "scale_")
 
 
+@cache
+def shifts(effect: Effect) -> str:
+    """The channel whose reading an effect adds to, where it does nothing else; empty if there is none."""
+    return _alone(effect, "bias_")
+
+
 def _alone(effect: Effect, kind: str) -> str:
     """The channel of the one number of a kind that an effect changes, if it changes no other; else empty."""
     changed = changes(effect)
@@ -82,7 +88,7 @@ def natural(effect: Effect, component: str, term: str) -> bool:
     """
     if (channel := scales(effect)) and component == f"sensor:{channel}":
         return set(term.split("*")) <= {"1", "time", channel}
-    if (channel := _alone(effect, "bias_")) and component == f"sensor:{channel}":
+    if (channel := shifts(effect)) and component == f"sensor:{channel}":
         return term in ("1", "time")
     if component not in COMPONENTS.values() or not (own := _regressors(effect)):
         return True

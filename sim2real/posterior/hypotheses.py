@@ -201,9 +201,8 @@ def is_home(h: Hypothesis, unknown: UnknownFit, told: float, explained: float, r
     formed = h.form is not None and told + unknown.misfit - h.form.least > FORMED * told
     if foreign(h.effects[0], unknown, raw) and explained < (MOSTLY if formed else SHAPE) * told:
         return False
-    return told > 0.0 and explained > LEAST**2 and (
-        explained > MOSTLY * told or like(h.fit, unknown, raw, explained / told)
-        or calibration(h.effects[0], unknown, raw))  # fmt: skip
+    return told > 0.0 and (calibration(h.effects[0], unknown, raw) or (explained > LEAST**2 and (
+        explained > MOSTLY * told or like(h.fit, unknown, raw, explained / told))))
 
 
 def normalised(found: Sequence[Hypothesis], least: float = KEPT) -> tuple[Hypothesis, ...]:
