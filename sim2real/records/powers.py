@@ -80,7 +80,7 @@ def _shaft_powers(p: NDArray, values: Mapping[str, FloatArray], per_power: Float
                   notes: list[str]) -> Powers:  # fmt: skip
     """Torque times speed, less J omega domega/dt of propellers that change their speed, where thrust tells J."""
     n = len(per_power)
-    speed = [values.get(f"rpm_{s}", np.full(n, p["propeller_rpm"])) * math.pi / 30.0 for s in SIDES]
+    speed = [turning(p, values, s, n) for s in SIDES]
     shaft = [values[f"torque_{s}"] * omega for s, omega in zip(SIDES, speed, strict=True)]
     spun = [_spinning_up(omega, dt) for omega in speed]
     inertia = 0.0
@@ -90,6 +90,11 @@ def _shaft_powers(p: NDArray, values: Mapping[str, FloatArray], per_power: Float
     if inertia > 0.0:
         notes.append(f"propellers change their speed: each takes up power as {inertia:.0f} kg m2, by recorded thrust")
     return {f"power_{s}": own - inertia * change for s, own, change in zip(SIDES, shaft, spun, strict=True)}
+
+
+def turning(p: NDArray, values: Mapping[str, FloatArray], side: str, n: int) -> FloatArray:
+    """Speed of rotation of a propeller, rad/s (n,): as recorded, else the governed one."""
+    return np.asarray(values.get(f"rpm_{side}", np.full(n, float(p["propeller_rpm"]))) * math.pi / 30.0)
 
 
 def _spinning_up(omega: FloatArray, dt: float) -> FloatArray:

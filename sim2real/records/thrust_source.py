@@ -16,7 +16,7 @@ from estimators.signals.data_checks import repaired
 from estimators.signals.resample import common_grid
 from icing_env import aircraft
 from icing_env.record import FlightRecord, FloatArray
-from sim2real.records.powers import SIDES, thrust_per_power
+from sim2real.records.powers import SIDES, thrust_per_power, turning
 
 BLOCK = 2.0  # s, of which means are compared
 LEAST = 0.2  # of a record's largest power, below which a share of it says little (assumed)
@@ -31,9 +31,13 @@ def as_measured(records: Sequence[FlightRecord]) -> list[FlightRecord]:
 
 def differs(records: Sequence[FlightRecord], others: Sequence[FlightRecord]) -> bool:
     """Whether one engine at least makes another thrust of the same torque and airspeed in `records`."""
-    sides = [([_chart(repaired(r), side) for r in records], [_chart(repaired(r), side) for r in others])
-             for side in SIDES]  # fmt: skip
-    return any(_apart([c for c in own if len(c)], [c for c in theirs if len(c)]) for own, theirs in sides)
+    own, theirs = ([repaired(record) for record in some] for some in (records, others))
+    return any(_apart(_charts(own, side), _charts(theirs, side)) for side in SIDES)
+
+
+def _charts(records: Sequence[FlightRecord], side: str) -> list[FloatArray]:
+    """Those of the records that have one."""
+    return [chart for record in records if len(chart := _chart(record, side))]
 
 
 def _chart(record: FlightRecord, side: str) -> FloatArray:
@@ -46,8 +50,7 @@ def _chart(record: FlightRecord, side: str) -> FloatArray:
         return np.zeros((0, 3))
     grid = common_grid(record)
     p = aircraft.load()[0]
-    turning = grid.values.get(f"rpm_{side}", np.full(len(grid.time), float(p["propeller_rpm"]))) * math.pi / 30.0
-    power = grid.values[f"torque_{side}"] * turning
+    power = grid.values[f"torque_{side}"] * turning(p, grid.values, side, len(grid.time))
     thrust, made = grid.values[f"thrust_{side}"], power * thrust_per_power(p, grid.values["airspeed"],
                                                                           grid.values["alpha"])
     length = max(1, round(BLOCK / grid.dt))
