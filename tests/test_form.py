@@ -34,7 +34,7 @@ from sim2real.posterior.generic import UnknownFit, fit_unknown
 from sim2real.posterior.home_terms import gain, without
 from sim2real.posterior.home_terms import given as after_terms
 from sim2real.posterior.hypotheses import Hypothesis, is_home, set_prior
-from sim2real.posterior.likeness import SHAPE, alike, calibration, foreign, is_own, like
+from sim2real.posterior.likeness import PURE, SHAPE, alike, calibration, foreign, is_own, like
 from sim2real.posterior.sets import SetFit
 
 TERMS = 6
@@ -267,6 +267,17 @@ def test_terms_are_an_effect_for_their_shape_where_they_are_of_its_own_regressor
     assert like(one, some({"alpha": 1.0}), raw, 0.4) and not like(one, some({"alpha": 1.0}), raw, 0.05)
     assert not like(one, some({"alpha_dot": 1.0}), raw, 0.4)
     assert alike(one, some({"alpha_dot": 1.0}), raw) > SHAPE
+
+
+def test_terms_of_nothing_but_its_own_regressors_are_an_effect_that_explains_nearly_half_of_them():
+    """Whatever their shape: drag that bends with the angle of attack is no line of its square."""
+    rows = {term.name: term.row for term in bank().terms if term.component == "x_force"}
+    drag = next(f for f in bank().families if f.effect.name == "drag_due_to_lift")
+    raw, one = np.eye(1 + max(*rows.values(), *drag.rows)), SetFit((drag,), weights={drag.rows[0]: 1.0})
+    for names, own in ((("1", "alpha", "alpha*alpha"), True), (("alpha", "alpha*alpha", "airspeed"), False)):
+        terms = UnknownFit("x_force", 0.0, tuple((n, 1.0, 0.1) for n in names), 0.0, {rows[n]: 1.0 for n in names})
+        assert alike(one, terms, raw) == 0.0
+        assert like(one, terms, raw, 1.1 * PURE) is own and not like(one, terms, raw, 0.9 * PURE)
 
 
 def test_the_moment_of_power_at_an_angle_is_not_of_the_moment_of_power_alone():

@@ -77,8 +77,21 @@ def test_a_model_without_the_lag_is_not_believed_where_an_explanation_puts_it_ba
         names = (effects,) if isinstance(effects, str) else effects
         families = tuple(next(f for f in bank().families if f.effect.name == name) for name in names)
         unknown = None if isinstance(effects, str) or not names else UnknownFit("pitching_moment", 1.0, (), 0.0, {})
-        return SimpleNamespace(best=Hypothesis(SetFit(families), unknown, 0.0, 0.0))
+        return SimpleNamespace(best=Hypothesis(SetFit(families), unknown, 0.0, 0.0), tempering=1.0)
 
     first = told(before) if before else SimpleNamespace(
-        best=Hypothesis(SetFit(), UnknownFit("pitching_moment", 1.0, (), 0.0, {}), 0.0, 0.0))
+        best=Hypothesis(SetFit(), UnknownFit("pitching_moment", 1.0, (), 0.0, {}), 0.0, 0.0), tempering=1.0)
     assert simpler(told(now), first) == believed
+
+
+@pytest.mark.parametrize(("left", "tempering", "believed"), [
+    (60_000.0, 1.0, True), (64_000.0, 1.0, True), (80_000.0, 1.0, False), (2_300.0, 140.0, False),
+])  # fmt: skip
+def test_a_model_without_the_lag_that_loses_the_records_is_not_believed_for_its_one_cause(left, tempering, believed):
+    """Two causes about the model with it, at the noise; one about the other, which takes the rest for strong gusts."""
+    families = {f.effect.name: f for f in bank().families}
+    two = SetFit((families["downwash_lag"], families["rudder_power"]), misfit=63_000.0)
+    one = SetFit((families["roll_trim"],), misfit=left)
+    first, again = (SimpleNamespace(best=Hypothesis(fit, None, 0.0, 0.0), tempering=t)
+                    for fit, t in ((two, 1.0), (one, tempering)))
+    assert simpler(again, first) == believed

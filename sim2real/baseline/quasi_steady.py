@@ -20,6 +20,7 @@ from sim2real.records.reconstruct import Reconstruction
 
 EFFECT, NUMBER, PITCH = "downwash_lag", "Cm_alphadot", "pitching_moment"
 UNDONE, KNOWN = 0.15, 0.1  # share of the lag that may be left, and to which the records tell it (assumed)
+LOSES = 1.1  # times what the best explanation left: a model that leaves more has lost the records (assumed)
 FAR = -3.0  # deviations of that number, below which an explanation needs less lag than is believed (assumed)
 NOTE = "the downwash does not lag, as in a quasi-steady set of derivatives taken by itself: no gap"
 
@@ -57,8 +58,12 @@ def worth_trying(posterior: Posterior, baseline: Baseline, candidates: Bank) -> 
 def simpler(now: Posterior, before: Posterior) -> bool:
     """Whether the best explanation has fewer causes, or as many and no unknown one any more.
 
-    None that puts the lag back: an aircraft that has it is told about the model that has it.
+    None that puts the lag back: an aircraft that has it is told about the model that has it. Nor one that leaves far
+    more of the records, with noise and gusts judged as that model has them.
     """
+    left, least = (told.best.left * told.tempering for told in (now, before))
+    if left > LOSES * least:
+        return False
     known = now.best.unknown is None and before.best.unknown is not None
     return EFFECT not in now.best.effects and now.best.things < before.best.things + known
 

@@ -69,6 +69,16 @@ def of_own(effect: Effect, component: str, term: str) -> bool:
     return natural(effect, component, term) and (not own or set(term.split("*")) <= own | ALWAYS)
 
 
+@cache
+def purely_own(effect: Effect, component: str, term: str) -> bool:
+    """Whether a generic term of a force or moment is made of the regressors of the derivatives that an effect changes.
+
+    Or a constant, which is what is left of any function; of an effect that changes anything else no term is.
+    """
+    own = _regressors(effect) if component in COMPONENTS.values() else set()
+    return bool(own) and set(term.split("*")) <= {*own, "1"}
+
+
 def _regressors(effect: Effect) -> set[str]:
     """Of the derivatives that an effect changes, where it changes nothing else but constants; else none."""
     changed = changes(effect)

@@ -9,7 +9,7 @@ import numpy as np
 from icing_env import effects
 from icing_env.effects import Effect
 from icing_env.record import FloatArray
-from sim2real.library.bends import bends, changes, natural, of_own, scales, shifts
+from sim2real.library.bends import bends, changes, natural, of_own, purely_own, scales, shifts
 from sim2real.posterior.form import LEAST, SHARES, WORTH, Form, at_home
 from sim2real.posterior.generic import COURSE, UnknownFit
 from sim2real.posterior.sets import SetFit
@@ -20,6 +20,7 @@ OF_PATH = {"_gearing": ("1", "position", "position*position*position"), "_lag": 
 MOSTLY, SHAPE = 0.6, 0.8  # of what generic terms explain, of their shape: an effect that is more of it is what they are
 FORMED = 0.9  # of what they explain, its own form allowed: an effect that is so much of it may be foreign to their kind
 SOME = 0.2  # of what they explain: an effect that is less of it is not what they are for their shape (assumed)
+PURE = 0.4  # of what they explain, as much where they are functions of its own regressors and of nothing else (assumed)
 
 
 def alike(fit: SetFit, unknown: UnknownFit, raw: FloatArray) -> float:
@@ -44,11 +45,15 @@ def like(fit: SetFit, unknown: UnknownFit, raw: FloatArray, share: float) -> boo
 
     Powers of its own regressors are, however little: the line among them may lie within the model's own uncertainty.
     Of others, what the model's numbers take anyway makes shapes alike (a lift that lags is first of all lift); most
-    must be of the effect's own regressors, and it must explain some.
+    must be of the effect's own regressors, and it must explain some. Where all are, nearly half of it is enough,
+    whatever their shape: a drag that bends with the angle of attack is not a line of its square.
 
     Args:
         share: that the effect explains of what the terms do.
     """
+    if share > PURE and all(any(purely_own(f.effect, unknown.component, term) for f in fit.families)
+                            for term, _, _ in unknown.terms):  # fmt: skip
+        return True
     if alike(fit, unknown, raw) <= SHAPE:
         return False
     own = {term for term, _, _ in unknown.terms if any(of_own(f.effect, unknown.component, term) for f in fit.families)}
