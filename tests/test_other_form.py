@@ -56,19 +56,46 @@ def test_a_derivative_that_an_effect_changes_alone_has_a_power_among_the_generic
             assert bends(effect) & known, effect.name
 
 
-@given(st.integers(0, 200), st.floats(0.0, 30.0))
-def test_a_form_is_worth_as_much_wherever_its_terms_are_flown(seed, left):
+@given(st.integers(0, 200), st.floats(0.0, 30.0), st.sampled_from([None, (True, False, False, False),
+                                                                  (False, True, False, True)]))
+def test_a_form_is_worth_as_much_wherever_its_terms_are_flown(seed, left, chosen):
     """Where all is linear, flying the terms at any size changes nothing of their evidence."""
     gram = products(seed, 4, left)
-    square = np.full(4, 4.0 * gram[0, 0])
-    plain = gain(gram[1:, 1:], gram[1:, 0], square, gram[0, 0])
+    square, powers = np.full(4, 4.0 * gram[0, 0]), None if chosen is None else np.array(chosen)
+    plain = gain(gram[1:, 1:], gram[1:, 0], square, gram[0, 0], powers=powers)
     at = np.random.default_rng(seed).standard_normal(4)
     moved = np.eye(5)
     moved[0, 1:] = at
     there = moved @ gram @ moved.T
-    flown = gain(there[1:, 1:], there[1:, 0], square, gram[0, 0], flown=at, closer=gram[0, 0] - there[0, 0])
+    flown = gain(there[1:, 1:], there[1:, 0], square, gram[0, 0], flown=at, closer=gram[0, 0] - there[0, 0],
+                 powers=powers)
+    assert flown.few == plain.few
     assert flown.gained == pytest.approx(plain.gained, rel=1e-6, abs=1e-4)
     assert flown.left == pytest.approx(plain.left, rel=1e-6, abs=1e-4)
+
+
+@given(st.integers(0, 200), st.floats(0.0, 30.0))
+def test_all_terms_and_powers_alone_are_as_likely_each_way(seed, left):
+    gram, powers = products(seed, 4, left), np.array([False, True, False, True])
+    square = np.full(4, 4.0 * gram[0, 0])
+
+    def logs(rows: np.ndarray, **more: np.ndarray) -> np.ndarray:
+        found = gain(gram[np.ix_(rows, rows)], gram[rows, 0], square[rows - 1], gram[0, 0], **more)
+        return np.array(found.gained) + np.log(len(found.gained))
+
+    every, few = logs(np.arange(1, 5)), logs(1 + np.flatnonzero(powers))
+    assert logs(np.arange(1, 5), powers=powers) == pytest.approx(np.logaddexp(every, few) - np.log(2.0), abs=1e-6)
+    for all_alike in (np.zeros(4, bool), np.ones(4, bool)):
+        assert logs(np.arange(1, 5), powers=all_alike) == pytest.approx(every)
+
+
+def test_a_saturation_does_not_pay_for_the_terms_that_it_does_not_need():
+    """One power among twenty terms of a moment."""
+    gram, powers = products(3, 20, 0.0), np.arange(20) == 4
+    onto, square = -gram[1:, 5], np.full(20, 1e4)
+    plain, few = (gain(gram[1:, 1:], onto, square, 1e4, powers=own) for own in (None, powers))
+    assert few.few and not plain.few and max(few.gained) > max(plain.gained) + 20.0
+    assert few.least == pytest.approx(plain.least, abs=0.1 * gram[5, 5])
 
 
 def test_what_one_component_may_take_another_may_not():

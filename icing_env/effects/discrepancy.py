@@ -28,7 +28,7 @@ TERMS: dict[str, tuple[str, ...]] = {
     "CZ": ("0", "alpha", "q", "elevator", "alpha_alpha", "alpha_alpha_alpha", "airspeed", "time", "beta_beta",
            "alpha_q", "alphadot", "CT", "alpha_CT"),
     "Cl": (*SIDEWAYS, "p_p_p", "aileron_aileron_aileron", "aileron_airspeed", "phi"),
-    "Cm": ("0", "alpha", "q", "elevator", "alpha_alpha", "alpha_elevator", "alpha_alpha_alpha",
+    "Cm": ("0", "alpha", "q", "elevator", "alpha_alpha", "alpha_elevator", "alpha_alpha_alpha", "elevator_elevator",
            "elevator_elevator_elevator", "q_q_q", "airspeed", "airspeed_airspeed", "time", "beta_beta",
            "elevator_airspeed", "aileron", "p", "r", "alpha_q", "CT", "alpha_CT", "alphadot", "theta"),
     "Cn": (*SIDEWAYS, "r_r_r", "rudder_rudder_rudder", "alpha_aileron", "alpha_rudder", "rudder_airspeed", "alpha_CT"),

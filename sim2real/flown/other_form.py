@@ -14,7 +14,7 @@ import numpy as np
 from icing_env.record import FloatArray
 from sim2real.flown.points import Flying
 from sim2real.flown.steps import Point, bounded_step, rooms, size_steps
-from sim2real.posterior.form import WORTH, Form
+from sim2real.posterior.form import WORTH, Form, own_powers
 from sim2real.posterior.generic import UnknownFit, fit_unknown_left, moved
 from sim2real.posterior.home_terms import gain
 from sim2real.posterior.sets import SetFit
@@ -43,11 +43,11 @@ def other_form(flying: Flying, fit: SetFit, flown: Bent, rows: Sequence[int], sq
     """
     left, terms = flown.left.reduced(), [flying.candidates.terms[row - 1] for row in rows]
     misfit, inner, onto = float(left[0, 0]), left[np.ix_(rows, rows)], left[rows, 0]
-    places = [term.component for term in terms]
-    form = gain(inner, onto, square, misfit, rho, places)
+    places, powers = [term.component for term in terms], own_powers(fit, terms)
+    form = gain(inner, onto, square, misfit, rho, places, powers=powers)
     k = int(np.argmax(form.gained))
-    chosen = [j for j, term in enumerate(terms)
-              if square[j] > 0.0 and inner[j, j] > 1e-9 and not term.component.endswith("_path")]  # fmt: skip
+    chosen = [j for j, term in enumerate(terms) if square[j] > 0.0 and inner[j, j] > 1e-9
+              and not term.component.endswith("_path") and (powers[j] or not form.few)]  # fmt: skip
     if not chosen or form.gained[k] < WORTH:
         return form, None
     variance = rho[k - 1] ** 2 * square[chosen] / inner[chosen, chosen]
@@ -55,7 +55,7 @@ def other_form(flying: Flying, fit: SetFit, flown: Bent, rows: Sequence[int], sq
     weights, after = bent.point.weights, bent.left.reduced()
     at = np.array([weights.get(term.row, 0.0) for term in terms])
     form = gain(after[np.ix_(rows, rows)], after[rows, 0], square, misfit, rho, places, at,
-                misfit - float(after[0, 0]))
+                misfit - float(after[0, 0]), powers)
     return replace(form, weights=dict(weights)), bent
 
 

@@ -20,7 +20,7 @@ from sim2real.library.candidates import NUISANCE_STEP, Bank
 from sim2real.library.sizes import flown_weights, in_powers
 from sim2real.posterior.any_course import with_courses
 from sim2real.posterior.forgiveness import forgive
-from sim2real.posterior.form import Form, energies, may_bend, own_terms, room, shares, squares, with_terms
+from sim2real.posterior.form import Form, energies, may_bend, own_powers, own_terms, room, shares, squares, with_terms
 from sim2real.posterior.generic import UnknownFit, beside, fit_unknown
 from sim2real.posterior.home_terms import gain, without
 from sim2real.posterior.hypotheses import (
@@ -222,7 +222,7 @@ def _form(reduced: FloatArray, raw: FloatArray, bank: Bank, fit: SetFit) -> Form
     own = squares(fit, reduced)
     square = room(fit, own, may_bend(own, squares(fit, raw)), terms, kept, float(reduced[0, 0]))
     return gain(*without(together, first), square, fit.misfit,
-                shares(fit.effects), [term.component for term in terms])
+                shares(fit.effects), [term.component for term in terms], powers=own_powers(fit, terms))
 
 
 def _with_unknown(reduced: FloatArray, raw: FloatArray, bank: Bank, known: Hypothesis,

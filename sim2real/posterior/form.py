@@ -15,6 +15,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from icing_env import effects
 from icing_env.record import FloatArray
@@ -70,7 +71,7 @@ class Form:
     gained: log evidence that they add, prior included; left: whitened square after them, luck taken out; free: at the
     home of each member, then of all; weights: of the terms where they were flown, by row of the bank; bent: `free` of
     the ways in which terms were flown, if they were: all but none, and `own`, the generic terms beside the set that are
-    the last way, if there are any.
+    the last way, if there are any; few: whether the likeliest way has powers of the set's own regressors alone.
     """
 
     gained: tuple[float, ...]
@@ -79,6 +80,7 @@ class Form:
     weights: dict[int, float] = field(default_factory=dict)
     bent: tuple[Liberty, ...] = ()
     own: UnknownFit | None = None
+    few: bool = False
 
     @property
     def least(self) -> float:
@@ -134,6 +136,12 @@ def own_terms(names: Iterable[str], terms: Sequence[Term]) -> list[Term]:
     places = [(_places(name), effects.LIBRARY[name]) for name in names]
     return [term for term in terms
             if any(term.component in own and natural(effect, term.component, term.name) for own, effect in places)]
+
+
+def own_powers(fit: SetFit, terms: Sequence[Term]) -> NDArray[np.bool_]:
+    """Which generic terms are powers of the regressors of derivatives that a set changes [terms]."""
+    return np.array([any((term.component, term.name) in bends(family.effect) for family in fit.families)
+                     for term in terms], bool)  # fmt: skip
 
 
 def home(names: Iterable[str]) -> set[str]:
