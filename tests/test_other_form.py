@@ -54,6 +54,9 @@ def test_a_derivative_that_an_effect_changes_alone_has_a_power_among_the_generic
     for effect in effects.LIBRARY.values():
         if len(changes(effect) & set(DERIVATIVE_NAMES)) == 1 and bends(effect):
             assert bends(effect) & known, effect.name
+    # nothing is symmetric about the elevator's trim, so that its square bends as well as its cube
+    cubed = {("pitching_moment", f"elevator{'*elevator' * times}") for times in (1, 2)}
+    assert cubed <= bends(effects.get("elevator_power")) & known
 
 
 @given(st.integers(0, 200), st.floats(0.0, 30.0), st.sampled_from([None, (True, False, False, False),
