@@ -13,6 +13,7 @@ from icing_env import effects, scenario
 from icing_env.aircraft import load
 from icing_env.types import DERIVATIVE_NAMES
 from sim2real.baseline.references import Baseline
+from sim2real.flown import other_form as in_form
 from sim2real.flown.other_form import Bent, bring, flown_unknown
 from sim2real.flown.points import Flying
 from sim2real.flown.steps import FARTHEST, bounded_step
@@ -20,6 +21,7 @@ from sim2real.library import candidates as library
 from sim2real.library.bends import bends, changes
 from sim2real.library.candidates import bank
 from sim2real.library.terms import BEYOND, GENERIC, GENERIC_SIZE, Term, in_common, pushes, values_of
+from sim2real.posterior.form import Form
 from sim2real.posterior.generic import fit_unknown
 from sim2real.posterior.home_terms import gain
 from sim2real.posterior.sets import SetFit
@@ -262,3 +264,18 @@ def test_something_unknown_is_worth_what_it_is_where_it_is_flown(bent):
     path = found.get("elevator_path", replace(linear, component="elevator_path"))
     untouched = flown_unknown(flying, SetFit(misfit=0.0), flown, path)  # judged on commands alone, exactly linear
     assert untouched[0] is path and untouched[1] is flown.point
+
+
+@pytest.mark.parametrize("few", [True, False])
+def test_a_form_of_powers_alone_is_flown_with_these_alone(bent, monkeypatch, few):
+    flying, flown = bent
+    terms, flew = flying.candidates.terms, list[list[int]]()
+    rows = [1 + j for j, term in enumerate(terms) if term.component == "pitching_moment"]
+    power = SetFit(tuple(f for f in bank().families if f.effect.name == "elevator_power"))
+    monkeypatch.setattr(in_form, "gain", lambda *_, **__: Form((0.0, 1e3), (0.0, 0.0), few=few))
+    monkeypatch.setattr(in_form, "bring", lambda _flying, _fit, there, chosen, _variance: flew.append(chosen) or there)
+    in_form.other_form(flying, power, flown, rows, np.ones(len(rows)), (0.4,))
+    (chosen,) = flew
+    powers = [row for row in rows if terms[row - 1].name in ("elevator", "elevator*elevator",
+                                                             "elevator*elevator*elevator")]  # fmt: skip
+    assert chosen == powers if few else len(chosen) > 2 * len(powers) == 6
