@@ -12,6 +12,7 @@ import pytest
 from icing_env import effects, scenario
 from icing_env.effects.effect import ENTERS_AT
 from icing_env.errors import InputError
+from icing_env.jit import source_hash
 from icing_env.record import FlightRecord, write
 from sim2real.records.reconstruct import reconstruct
 from testbed.benchmarks import answers
@@ -175,3 +176,15 @@ def test_the_run_of_the_benchmark_asks_the_rivals_with_the_keys_closed(tmp_path)
     assert "theta" in json.loads((tmp_path / "answers_bic" / "a.json").read_text())["error"]
     assert said == ["answers_bic: 1 of 1"]
     assert (tmp_path / "keys").stat().st_mode & 0o777 == answers.OPEN
+
+
+def test_a_run_does_not_go_on_with_the_answers_of_another_solver(tmp_path):
+    (tmp_path / "keys").mkdir()
+    (tmp_path / "answers").mkdir()
+    for name, said in (("a", {"provenance": {"sources": source_hash("sim2real")}}), ("b", {"error": "no theta"})):
+        (tmp_path / "answers" / f"{name}.json").write_text(json.dumps(said))
+    answers.answer_all(tmp_path, "answers", {"a": (), "b": ()}, 1, print, run.solve)
+    (tmp_path / "answers" / "b.json").write_text(json.dumps({"provenance": {"sources": "0123456789abcdef"}}))
+    with pytest.raises(InputError, match=r"b\.json: the answer of another solver \(sources 0123456789abcdef"):
+        answers.answer_all(tmp_path, "answers", {"a": (), "b": ()}, 1, print, run.solve)
+    assert len(list((tmp_path / "answers").iterdir())) == 2  # nothing is lost

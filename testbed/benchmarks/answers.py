@@ -15,7 +15,7 @@ from typing import Any
 
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord
-from testbed.withheld.files import write_text
+from testbed.withheld.files import read_json, write_text
 from testbed.workers import processes
 
 OPEN = 0o700  # of the key folder outside the diagnosis
@@ -28,15 +28,35 @@ def answer_all(out: Path, folder: str, jobs: Mapping[str, tuple[Any, ...]], work
 
     Args:
         solver: of the folder of a case's records and what the job holds; it runs in another process.
+
+    Raises:
+        InputError: another diagnosis (other sources) gave the answers that are there.
     """
     answers, names = out / folder, list(jobs)
     answers.mkdir(parents=True, exist_ok=True)
     left = [name for name in names if not (answers / f"{name}.json").is_file()]
+    of_one_solver([answers / f"{name}.json" for name in names if name not in left])
     with closed(out / "keys"), processes(workers) as pool:
         running = {pool.submit(solver, out / "records" / name, *jobs[name]): name for name in left}
         for k, task in enumerate(as_completed(running), start=len(names) - len(left) + 1):
             write_text(answers / f"{running[task]}.json", json.dumps(task.result(), allow_nan=False))
             progress(f"{folder}: {k} of {len(names)}")
+
+
+def of_one_solver(given: Sequence[Path]) -> None:
+    """Check that today's diagnosis gave some answers; those of no diagnosis (a rival's, refused records) are any's.
+
+    Raises:
+        InputError: another one did; what was scored with them would be told as today's.
+    """
+    from icing_env.jit import source_hash
+
+    own = source_hash("sim2real")
+    for path in given:
+        sources = read_json(path).get("provenance", {}).get("sources", own)
+        if sources != own:
+            raise InputError(f"{path}: the answer of another solver (sources {sources}, these are {own}): give another "
+                             "--out, or remove the answers, and refly beside them, to have the cases answered again")
 
 
 @contextmanager
