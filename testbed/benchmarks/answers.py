@@ -7,7 +7,7 @@ run goes on where it stopped.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
 from contextlib import contextmanager
 from pathlib import Path
@@ -34,8 +34,9 @@ def answer_all(out: Path, folder: str, jobs: Mapping[str, tuple[Any, ...]], work
     """
     answers, names = out / folder, list(jobs)
     answers.mkdir(parents=True, exist_ok=True)
-    left = [name for name in names if not (answers / f"{name}.json").is_file()]
-    of_one_solver([answers / f"{name}.json" for name in names if name not in left])
+    there = {name: path for name in names if (path := answers / f"{name}.json").is_file()}
+    left = [name for name in names if name not in there]
+    of_one_solver(there.values())
     with closed(out / "keys"), processes(workers) as pool:
         running = {pool.submit(solver, out / "records" / name, *jobs[name]): name for name in left}
         for k, task in enumerate(as_completed(running), start=len(names) - len(left) + 1):
@@ -43,7 +44,7 @@ def answer_all(out: Path, folder: str, jobs: Mapping[str, tuple[Any, ...]], work
             progress(f"{folder}: {k} of {len(names)}")
 
 
-def of_one_solver(given: Sequence[Path]) -> None:
+def of_one_solver(given: Iterable[Path]) -> None:
     """Check that today's diagnosis gave some answers; those of no diagnosis (a rival's, refused records) are any's.
 
     Raises:
