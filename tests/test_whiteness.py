@@ -16,10 +16,11 @@ from icing_env.record import read
 from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import _reconstructed
 from sim2real.prediction.as_predicted import as_predicted
-from sim2real.prediction.gusts import KINDS, Gusts
-from sim2real.prediction.kalman import _within_steps, follow, gains, linearise, roughness
+from sim2real.prediction.gusts import KINDS, LATER, Gusts
+from sim2real.prediction.kalman import follow, gains, linearise, roughness
 from sim2real.prediction.predictor import TANGENT, Predictor, innovations
 from sim2real.prediction.readings import apart
+from sim2real.prediction.within_steps import within_steps
 from sim2real.records.channels import FED_BACK, MEASURED
 from sim2real.records.noise import step_noise
 from sim2real.records.reconstruct import Reconstruction
@@ -47,7 +48,8 @@ def flown(folder, sigma: float, seed: int, gusts: str = "later") -> Reconstructi
 
 
 @pytest.mark.parametrize(("sigma", "gusts"), [(SIGMAS[0], "later"), (0.5, "later"), (1.5, "later"), (0.5, "turning"),
-                                              (1.5, "at_once"), (0.5, "rolling")])  # fmt: skip
+                                              (1.5, "at_once"), (0.5, "rolling"), (1.5, "turning"),
+                                              (1.5, "rolling")])  # fmt: skip
 def test_innovations_of_a_known_aircraft_are_white(tmp_path, sigma, gusts):
     white, kind = [], KINDS[conditions.KINDS.index(gusts)]
     for seed in range(SEEDS):
@@ -178,11 +180,28 @@ def test_gusts_between_samples_disturb_as_much_as_flights_show(tmp_path):
     one, other = (fly(Aircraft(), manoeuvre, 1.0, g).states for g in (gust, straight))
     flight = flown(tmp_path, 0.0, 0)
     A = linearise(flight)[0][0]
-    expected = _within_steps(A, Gusts(1.0).noise(flight), Gusts(1.0), flight)
+    expected = within_steps(A, Gusts(1.0).noise(flight), LATER, 0.0)
     for name, column in (("p", pl.P), ("q", pl.Q), ("r", pl.R)):
         apart = float(np.std(np.diff(one[:, column] - other[:, column])))
         j = TANGENT.index(name)
         assert apart == pytest.approx(np.sqrt(expected[j, j]), rel=0.3), name
+
+
+def test_what_moves_the_gusts_is_met_at_the_end_of_a_step(tmp_path):
+    """The linearised map and the predictor's own flight turn the air alike; the plant starts its lags otherwise."""
+    kind = KINDS[conditions.KINDS.index("turning")]
+    flight, size = flown(tmp_path, 0.0, 0), 0.1
+    A = linearise(flight, [slice(0, 25)], kind)[0][0]
+    for gust in ("dryden_v1", "dryden_v2", "dryden_w1", "gust_v", "gust_w"):
+        plant = Predictor(flight, np.repeat(flight.parameters, 2), kind=kind)
+        plant.place(0)
+        column = TANGENT.index(gust)
+        plant.correct(np.outer([size, -size], np.arange(len(TANGENT)) == column))
+        plant.fly(1)
+        one, other = plant.tangent() / (2.0 * size)
+        for row in ("dryden_q", "dryden_r", "gust_q", "gust_r"):
+            j = TANGENT.index(row)
+            assert A[j, column] == pytest.approx(one[j] - other[j], rel=0.01, abs=1e-6), (gust, row)
 
 
 def test_noise_of_recorded_torque_disturbs_as_much_as_flights_show(tmp_path):

@@ -61,10 +61,27 @@ def test_the_tail_meets_the_vertical_gust_later_or_at_once(kind):
 
 
 def test_the_tails_delay_is_the_same_whether_the_air_turns():
-    """The first is drawn apart, for sets of old; both are the document's Pade form."""
+    """Both are the document's Pade form."""
     spread = {kind: np.std(found[:, pl.G_TAIL] - found[:, pl.G_W]) for kind in ("later", "rolling")
               for found in (drawn(kind),)}  # fmt: skip
     assert spread["later"] == pytest.approx(spread["rolling"], rel=0.05)
+
+
+@pytest.mark.parametrize("kind", ["later", "turning", "rolling"])
+def test_air_turns_and_meets_the_tail_by_what_is_flown(kind):
+    """Between samples the plant flies straight lines: along them the air turns by what v and w change, over V."""
+    found, h = drawn(kind, seconds=40.0), pl.DT / pl.SUB
+    lag = 4.0 * SPAN / (math.pi * V)
+    yawing, pitching = (pl.G_R, pl.G_V, 0.75 * lag), (pl.G_Q, pl.G_W, lag)
+    cases = {"turning": (yawing, pitching), "rolling": (yawing,)}
+    for rate, gust, time in cases.get(kind, ()):
+        turned = found[:, rate] * (1.0 if rate == pl.G_R else -1.0)
+        behind = found[:, gust] - turned * time * V
+        assert V * np.trapezoid(turned, dx=h) == pytest.approx(behind[-1] - behind[0], abs=1e-9)
+    if kind != "turning":
+        later = 0.5 * (found[:, pl.G_TAIL] + found[:, pl.G_W])
+        missed = np.trapezoid(found[:, pl.G_TAIL] - found[:, pl.G_W], dx=h)
+        assert missed == pytest.approx(-PUBLISHED["tail_arm"] / V * (later[-1] - later[0]), abs=1e-9)
 
 
 def test_distances_know_the_kind_of_gusts():

@@ -23,7 +23,6 @@ from icing_env.turbulence import (
     roll_time,
     scales,
     stay_level,
-    transverse,
 )
 from sim2real.records.reconstruct import Reconstruction
 
@@ -122,8 +121,8 @@ def drift_translation(s: Any, airspeed: float, dt: float) -> None:
 @kernel
 def drift_turbulence(s: Any, p: Any, airspeed: float, dt: float) -> None:
     """`advance_turbulence` as a predictor sees it: nothing is drawn."""
-    v, before = max(airspeed, LOWEST_AIRSPEED), s.gust_w
-    v_before, w_before = transverse(s.dryden_v1, s.dryden_v2), transverse(s.dryden_w1, s.dryden_w2)
+    v = max(airspeed, LOWEST_AIRSPEED)
+    v_before, w_before = s.gust_v, s.gust_w
     drift_translation(s, v, dt)
     put_translation(s)
     if p.turbulence_rotation != 0.0:
@@ -133,6 +132,6 @@ def drift_turbulence(s: Any, p: Any, airspeed: float, dt: float) -> None:
     else:
         stay_level(s)
     if p.turbulence_tail_delay != 0.0:
-        reach_tail(s, p, v, before, dt)
+        reach_tail(s, p, v, w_before, dt)
     else:
         s.gust_w_tail = s.gust_w

@@ -19,11 +19,12 @@ from sim2real.prediction.correction import ROTATION
 from sim2real.prediction.gusts import LATER, Gusts, Kind
 from sim2real.prediction.predictor import TANGENT, Predictor, stretch
 from sim2real.prediction.readings import ALTITUDE, apart, read_share, unread
+from sim2real.prediction.within_steps import as_met, within_steps
 from sim2real.records.channels import FED_BACK, MEASURED, NOISE_FLOOR, SURFACES
 from sim2real.records.reconstruct import Reconstruction
 
 # What disturbs the states beside gusts, per square root of second: little, since what is disturbed is forgotten, steady
-# moments first; and per m/s of gusts beside `_within_steps`. Both are set where innovations of aircraft that the model
+# moments first; and per m/s of gusts beside `within_steps`. Both are set where innovations of aircraft that the model
 # knows are white, means over 100 samples and over whole records included (`tests/test_whiteness.py`).
 WALK = {"u": 3e-3, "v": 3e-3, "w": 3e-3, "p": 3e-5, "q": 3e-5, "r": 3e-5, "altitude": 5e-3, "phi": 4e-5, "theta": 4e-5}
 WALK_OF_GUST = {"q": 2.5e-4, "phi": 5e-5, "theta": 5e-5}
@@ -101,7 +102,7 @@ def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),), k
     C = np.swapaxes((y[:, :n] - y[:, n : 2 * n]) / (2.0 * size[:, None]), 1, 2)
     B = np.stack([(z[:, 2 * n + 2 * j] - z[:, 2 * n + 2 * j + 1]) / (2.0 * step)
                   for j, step in enumerate(INPUTS.values())], axis=2)  # fmt: skip
-    return A, C, B
+    return as_met(A, A, kind), as_met(C, A, kind), B
 
 
 def gains(flight: Reconstruction, sigmas: Sequence[float], kind: Kind = LATER) -> list[Gain]:
@@ -163,35 +164,10 @@ def _noisy(flight: Reconstruction, A: FloatArray, C: FloatArray, B: FloatArray, 
     least = np.array([NOISE_FLOOR[name] for name in MEASURED[:FED_BACK]])
     G, D = A[:, DRYDEN], C[:, DRYDEN]
     driven = np.concatenate([flight.surface_noise, flight.power_noise])
-    Q = G @ Qw @ G.T + np.diag(walk**2 * flight.dt) + (B * driven**2) @ B.T + _within_steps(A, Qw, gusts, flight)
+    Q = G @ Qw @ G.T + np.diag(walk**2 * flight.dt) + (B * driven**2) @ B.T
+    Q = Q + within_steps(A, Qw, gusts.kind, gusts.span(flight))
     R = np.diag(np.where(read == 0.0, ABSENT, np.maximum(noise, least**2) / np.maximum(read, 1e-3)))
     return A, C, Q, D @ Qw @ D.T + R, G @ Qw @ D.T
-
-
-def _within_steps(A: FloatArray, Qw: FloatArray, gusts: Gusts, flight: Reconstruction) -> FloatArray:
-    """Covariance of the states' noise from how gusts leave the straight lines between samples that the model has.
-
-    White noise drives them: about its line such a gust is a Brownian bridge, whose mean over the step has a twelfth of
-    the variance that the step adds. The tail's delay (a Pade form) passes what is quick with its sign turned, and twice
-    that mean a little later. Air that turns does so by what is quick in v and w.
-    """
-    u, v, w, tail, p, q, r = (TANGENT.index(f"gust_{n}") for n in ("u", "v", "w", "w_tail", "p", "q", "r"))
-    moved = [*(TANGENT.index(n) for n in ("u", "v", "w", "p", "q", "r")), tail]
-    shape = np.zeros((4, 8))
-    shape[0, 0] = shape[3, 5] = 1.0
-    shape[1, 1:3] = shape[2, 3:5] = np.sqrt(1.5), (1.0 - np.sqrt(3.0)) / np.sqrt(2.0)
-    of_tail = 2.0 * A[moved, tail] / (1.0 + A[tail, tail])  # of a gust there that lasts the step
-    of_wing = 2.0 * A[moved, w] - A[tail, w] * of_tail
-    later = gusts.kind.tail_delay
-    by_w, by_v = of_wing + (-of_tail if later else of_tail), 2.0 * A[moved, v]
-    if span := gusts.span(flight):
-        by_w = by_w - 2.0 * A[moved, q] * np.pi / (4.0 * span) * (not later)
-        by_v = by_v + 2.0 * A[moved, r] * np.pi / (3.0 * span)
-    mean = np.column_stack([2.0 * A[moved, u], by_v, by_w, 2.0 * A[moved, p]])
-    mean[-1] = 0.0, 0.0, 2.0 * (1.0 - A[tail, tail]) if later else 0.0, 0.0
-    out = np.zeros_like(A)
-    out[np.ix_(moved, moved)] = mean * np.diag(shape @ Qw @ shape.T) @ mean.T / 12.0
-    return out
 
 
 def roughness(A: FloatArray, C: FloatArray, G: FloatArray, D: FloatArray, Qw: FloatArray,

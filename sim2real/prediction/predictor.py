@@ -91,8 +91,13 @@ class Predictor:
         Returns:
             What the instruments should read [steps, n, channels]; with a gain measured less that, nan where nothing
             was measured.
+
+        Raises:
+            ValueError: the rows share one PARAMETERS row, which is enough to linearise but not to fly.
         """
         flight = self.flight
+        if len(self.fleet.parameters) != self.n:
+            raise ValueError(f"{self.n} rows need a PARAMETERS row each to be flown")
         out = np.empty((steps, self.n, len(MEASURED)))
         start = np.full(self.n, first, np.intp) if isinstance(first, int) else np.asarray(first, np.intp)
         K = np.zeros((0, 0, 0, 0)) if gain is None else gain[None] if gain.ndim == 3 else gain

@@ -21,6 +21,7 @@ from testbed.withheld.plant import DT, G_P, G_Q, G_R, G_TAIL, G_U, G_V, G_W, GUS
 from testbed.withheld.published import PUBLISHED
 
 LENGTH = 1750.0 * 0.3048  # m
+LATER, TURNING = ("later", "rolling"), ("turning", "rolling")  # of `conditions.KINDS`
 
 
 def continuous(sigma: float, scale: float, speed: float) -> tuple[NDArray, NDArray, NDArray]:
@@ -43,7 +44,7 @@ def along(kind: str, sigma: float, scale: float, speed: float) -> tuple[NDArray,
     4 b / (pi V) and 3 b / (pi V).
     """
     A5, B5, C5 = continuous(sigma, scale, speed)
-    later, turns = kind in ("later", "rolling"), kind in ("turning", "rolling")
+    later, turns = kind in LATER, kind in TURNING
     n, m = 5 + later + 3 * turns, 3 + turns
     A, B, C = np.zeros((n, n)), np.zeros((n, m)), np.zeros((GUSTS, n))
     A[:5, :5], B[:5, :3], C[[G_U, G_V, G_W], :5] = A5, B5, C5
@@ -95,13 +96,19 @@ def draw(samples: int, sigma: float, scale: float, speed: float, rng: np.random.
     out = np.zeros((steps, GUSTS))
     if sigma == 0.0:
         return out
-    if kind != "later":
-        A, B, C = along(kind, sigma, scale, speed)
-        out[:] = _drawn(A, B, steps, step, rng) @ C.T
-        return out
-    A, B, C = continuous(sigma, scale, speed)
-    out[:, [G_U, G_V, G_W]] = _drawn(A, B, steps, step, rng) @ C.T
-    out[:, G_TAIL] = _delayed(out[:, G_W], PUBLISHED["tail_arm"] / speed, step)
+    A, B, C = along(kind, sigma, scale, speed)
+    A5, B5, C5 = A[:5, :5], B[:5, :3], C[[G_U, G_V, G_W], :5]
+    out[:, [G_U, G_V, G_W]] = _drawn(A5, B5, steps, step, rng) @ C5.T
+    v, w = out[:, G_V], out[:, G_W]
+    out[:, G_TAIL] = w
+    if kind in LATER:
+        out[:, G_TAIL] = 2.0 * _lagged(w, 0.5 * PUBLISHED["tail_arm"] / speed, step) - w
+    if kind in TURNING:
+        p, lag = np.flatnonzero(B[:, 3])[0], 4.0 * PUBLISHED["span"] / (math.pi * speed)
+        out[:, G_P] = _drawn(A[p : p + 1, p : p + 1], B[p : p + 1, 3:], steps, step, rng)[:, 0]
+        out[:, G_R] = (v - _lagged(v, 0.75 * lag, step)) / (0.75 * lag * speed)
+        if kind not in LATER:
+            out[:, G_Q] = (_lagged(w, lag, step) - w) / (lag * speed)
     return out
 
 
@@ -114,8 +121,11 @@ def _drawn(A: NDArray, B: NDArray, steps: int, step: float, rng: np.random.Gener
     return np.asarray(_march(F, noise, start))
 
 
-def _delayed(w: NDArray, delay: float, step: float) -> NDArray:
-    """(1 - s delay/2)/(1 + s delay/2) of `w`, bilinear: 2 z - w with z a lag of delay/2."""
-    a = delay / step
-    z, _ = lfilter([1.0, 1.0], [1.0 + a, 1.0 - a], w, zi=np.array([(1.0 - (1.0 / (1.0 + a))) * w[0]]))
-    return np.asarray(2.0 * z - w)
+def _lagged(x: NDArray, time: float, step: float) -> NDArray:
+    """`x` behind a lag, bilinear: of the straight lines that the plant flies between samples, not of what is quicker.
+
+    With a lag of all that is quicker, the air would turn for good by what the plant does not meet of v and w, and the
+    tail would not have its delay's gain of one.
+    """
+    a = 2.0 * time / step
+    return np.asarray(lfilter([1.0, 1.0], [1.0 + a, 1.0 - a], x, zi=np.array([(1.0 - 1.0 / (1.0 + a)) * x[0]]))[0])
