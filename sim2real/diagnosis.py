@@ -25,7 +25,7 @@ from sim2real.closing.parts import Flown
 from sim2real.closing.remedy import Remedy, remedy, resimulation, values_of
 from sim2real.closing.whole_model import components_with
 from sim2real.ladder import ladder
-from sim2real.library.candidates import SPREAD, Bank, bank, not_testable
+from sim2real.library.candidates import SPREAD, Bank, bank, not_testable, of_model
 from sim2real.library.terms import in_common
 from sim2real.over_time.history import SAME, History, histories
 from sim2real.planning.limits import limits
@@ -175,7 +175,8 @@ def _at_hand(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord], 
         baseline = fit_baseline(_reconstructed(reference, None, simulator), candidates)
         if otherwise_loaded(reference, records):
             baseline = of_another_loading(baseline, candidates.nuisances)
-        candidates = replace(candidates, clean=baseline.clean)
+        candidates = replace(candidates, nuisances=of_model(candidates.nuisances, baseline.parameters),
+                             clean=baseline.clean)  # fmt: skip
     flights = _reconstructed(records, baseline, simulator)
     return _AtHand(flights, _reconstructed(held_out, baseline, simulator), candidates, baseline, without,
                    not_testable(flights, candidates))

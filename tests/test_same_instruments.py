@@ -12,7 +12,7 @@ from icing_env.record import FlightRecord, RecordMeta, read
 from sim2real.baseline.loading import CENTRE, INERTIA, of_another_loading, otherwise_loaded
 from sim2real.baseline.references import Baseline, uncertain
 from sim2real.diagnosis import diagnose
-from sim2real.library.candidates import SPREAD, TOLD_ONCE, nuisances
+from sim2real.library.candidates import SIGNED, SPREAD, TOLD_ONCE, nuisances, shifted
 from testbed.withheld.conditions import Conditions
 from testbed.withheld.files import record_text, side_text
 from testbed.withheld.flights import Aircraft, recorded
@@ -55,6 +55,26 @@ def test_a_number_that_one_source_tells_may_be_another_without_a_gap(tmp_path, n
     within, beyond = (Aircraft(baseline={number: 1.0 + times * TOLD_ONCE[number]}) for times in (-1.2, -8.0))
     assert diagnose(flown(tmp_path, "diagnose", within, 4)).verdict == "no_gap"
     assert diagnose(flown(tmp_path, "diagnose", beyond, 4)).verdict != "no_gap"
+
+
+@pytest.mark.parametrize("number", SIGNED)
+def test_such_a_number_may_have_the_other_sign_without_a_gap(tmp_path, number):
+    """Held at a tenth of the published one, and stepped by parts of what it was moved to, one in nine was a gap."""
+    other = Aircraft(baseline={number: 1.0 - 2.5 * TOLD_ONCE[number]})
+    assert diagnose(flown(tmp_path, "diagnose", other, 4)).verdict == "no_gap"
+
+
+def test_deviations_of_such_numbers_add():
+    moves, one = nuisances(), np.zeros(len(nuisances()))
+    for j, move in enumerate(moves):
+        if move.name in SIGNED:
+            one[j] = -1.7
+    row = load()
+    twice = shifted(shifted(row, moves, one, "torque"), moves, one, "torque")
+    both = shifted(row, moves, 2.0 * one, "torque")
+    for name in SIGNED:
+        assert twice[name][0] == pytest.approx(both[name][0])
+        assert both[name][0] == pytest.approx((1.0 - 3.4 * TOLD_ONCE[name]) * row[name][0])
 
 
 def loaded(mass: float | None, inertia: float = 1.0) -> FlightRecord:

@@ -28,7 +28,8 @@ EFFECT = Effect(
     enters_at=("x_force", "y_force", "z_force", "rolling_moment", "pitching_moment", "yawing_moment", "mass"),
     description="Derivatives, mass, thrust line and slipstream, by what part of the model's; offsets of channels",
     source="docs/model.md, section 20",
-    parameters=(*(Parameter(name, "1", neutral=0.0, typical=0.0, low=-1.0, high=10.0) for name in NUMBERS),
+    parameters=(*(Parameter(name, "1", neutral=0.0, typical=0.0, low=-0.9 if name == "mass" else -10.0, high=10.0)
+                  for name in NUMBERS),
                 *(Parameter(name, unit, neutral=0.0, typical=0.0, low=-10.0, high=10.0)
                   for name, unit in OFFSETS.items())),
     apply=apply,

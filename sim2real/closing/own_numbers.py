@@ -51,8 +51,13 @@ def of_component(change: Remedy, component: str) -> Remedy:
 
 def own_numbers(settled: Settled, moves: Sequence[Nuisance]) -> Remedy:
     """The aircraft with derivatives, mass, thrust line and offsets as they settled, and nothing else changed."""
-    own = {move.parameter: (move.factor * float(size) if move.absolute else max(move.factor * float(size), LEAST - 1.0),
-                            OWN_NUMBERS * move.factor * float(error))
+    own = {move.parameter: (_change(move, float(size)), OWN_NUMBERS * move.factor * float(error))
            for move, size, error in zip(moves, settled.nuisances, settled.error, strict=True)
            if move.parameter in (*NUMBERS, *OFFSETS)}  # fmt: skip
     return Remedy({OWN: {name: change for name, (change, _) in own.items()}}, own=own)
+
+
+def _change(move: Nuisance, size: float) -> float:
+    """What part of its own a number changes by; an offset by so much."""
+    least = -np.inf if move.absolute or move.about is not None else LEAST - 1.0
+    return max(move.factor * size, least)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from icing_env import effects
+from icing_env import aircraft, effects
 from icing_env.effects import Effect, Parameter
 from icing_env.parameters import as_bytes, copied
 from icing_env.record import FloatArray
@@ -33,18 +33,23 @@ VANE_SPREAD, PITOT_SPREAD, BOOM_SPREAD = 0.008, 0.05, 1e-4
 # to lift and to the elevator (a simulator built on a published set has neither), and what part of the pitch damping
 # comes from the delay of the downwash (a quasi-steady set has it in Cm_q); assumed
 TOLD_ONCE = {"engine_arm_z": 0.5, "CZ_CT": 0.5, "Cm_elevator_CT": 0.5, "Cm_alphadot": 0.1}
+SIGNED = ("engine_arm_z", "CZ_CT", "Cm_elevator_CT")  # of these, so uncertain that they may have the other sign
 VANE_SCALE = 0.015  # of a flow vane's reading, upwash included (assumed)
 # What a calibrated installation is still off by, in the channel's unit; gyros are zeroed at rest (assumed)
 CALIBRATION = {"bias_airspeed": 0.1, "bias_alpha": 8e-4, "bias_beta": 8e-4, "bias_phi": 8e-4, "bias_theta": 8e-4,
                "bias_ax": 0.008, "bias_ay": 0.008, "bias_az": 0.01}  # fmt: skip
-LEAST = 0.1  # of a published value: a filter or a thrust with another sign does not fly
+LEAST = 0.1  # of any other published value: a filter or a thrust with another sign does not fly
 NODES, FEW = 4, 2  # sizes of a parameter; and where it only has to be seen whether it is worth more
 NUISANCE_STEP = 0.1  # standard deviations at which the derivative with respect to a nuisance is taken
 
 
 @dataclass(frozen=True)
 class Nuisance:
-    """One direction in which the model may be wrong without that being a gap; prior N(0, 1) in its own unit."""
+    """One direction in which the model may be wrong without that being a gap; prior N(0, 1) in its own unit.
+
+    `about`: what the model has of a number that is SIGNED. A part of what it was moved to would be no deviation: of a
+    number two deviations of a half off there is nothing left to move by.
+    """
 
     name: str
     parameter: str  # of PARAMETERS; several joined by +
@@ -52,6 +57,7 @@ class Nuisance:
     absolute: bool = False
     only: str = ""  # where the power comes from, if it holds for such records alone
     follows: bool = True  # whether the model that all is flown about follows it
+    about: float | None = None
 
     def apply(self, rows: NDArray, row: int | slice, power_from: str, size: float | FloatArray = NUISANCE_STEP) -> None:
         """Move one row of PARAMETERS (or several, by as many sizes) by `size` standard deviations in this direction."""
@@ -60,7 +66,10 @@ class Nuisance:
         step = size * self.factor
         for name in self.parameter.split("+"):
             now = rows[name][row]
-            moved = now + step if self.absolute else now * np.maximum(1.0 + step, LEAST)
+            if self.absolute or self.about is not None:
+                moved = now + step * (1.0 if self.about is None else self.about)
+            else:
+                moved = now * np.maximum(1.0 + step, LEAST)
             rows[name][row] = np.maximum(moved, 0.0) if name.endswith("_lag") else moved
 
 
@@ -100,6 +109,12 @@ class Bank:
         return (*range(1, 1 + len(self.nuisances)), *(term.row for term in self.terms))
 
 
+def of_model(directions: Iterable[Nuisance], row: NDArray) -> tuple[Nuisance, ...]:
+    """The same for a model with such PARAMETERS."""
+    return tuple(replace(n, about=float(row[n.parameter][0])) if n.name in SIGNED and not n.absolute else n
+                 for n in directions)  # fmt: skip
+
+
 def nuisances() -> tuple[Nuisance, ...]:
     """Derivatives by `SPREAD`, mass, what levers or one source tell, instruments and the recorder."""
     derivatives = [Nuisance(name, name, SPREAD) for name in DERIVATIVE_NAMES]
@@ -110,7 +125,8 @@ def nuisances() -> tuple[Nuisance, ...]:
     vanes = [Nuisance(f"scale_{c}", f"scale_{c}", VANE_SCALE, True, follows=False) for c in ("alpha", "beta")]
     told_once = [Nuisance(name, name, spread) for name, spread in TOLD_ONCE.items()]
     offsets = [Nuisance(name, name, spread, True, follows=False) for name, spread in CALIBRATION.items()]
-    return (*derivatives, Nuisance("mass", "mass", MASS_SPREAD), guessed, *told_once, *vanes, *offsets, *timing)
+    every = (*derivatives, Nuisance("mass", "mass", MASS_SPREAD), guessed, *told_once, *vanes, *offsets, *timing)
+    return of_model(every, aircraft.load())
 
 
 def nodes(parameter: Parameter) -> tuple[float, ...]:
