@@ -47,6 +47,12 @@ def leading(posterior: Posterior) -> list[Hypothesis]:
     return chosen if any(h.effects for h in chosen) else []
 
 
+def told_by_paths(linear: Posterior, first: SetFit) -> bool:
+    """Whether paths tell of another effect than those of a set, whatever that leaves of the flight."""
+    return any(fit.log_evidence > LEAST_ADDED and name not in first.effects and apart(fit.family.effect)
+               for name, fit in linear.fits.items())
+
+
 def companions(flying: Flying, linear: Posterior, first: SetFit, point: Point) -> list[EffectFit]:
     """Effects to fly beside a single one, with their sizes there.
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
-from sim2real.flown.companions import companions, leading, together, without
+from sim2real.flown.companions import companions, leading, together, told_by_paths, without
 from sim2real.flown.corrections import corrected, inherited, lost
 from sim2real.flown.liberty import AtLiberty
 from sim2real.flown.other_form import Bent, flown_unknown, other_form
@@ -187,11 +187,12 @@ class _Search:
         return [j for i in dict.fromkeys(alone[:1] + as_it_is[:1]) for j in self._companions(i)]
 
     def _companions(self, i: int) -> list[int]:
-        first, left = self.found[i], float(self.left[i].reduced()[0, 0])
-        if not any(left - u.left > TAKEN for u in self.generic[i]) and not len(self.points[i].held):
+        first, left = self.found[i].fit, float(self.left[i].reduced()[0, 0])
+        room = any(left - u.left > TAKEN for u in self.generic[i]) or told_by_paths(self.linear, first)
+        if not room and not len(self.points[i].held):
             return []
-        return [self.propose(together(first.fit, fit))
-                for fit in companions(self.flying, self.linear, first.fit, self.points[i])]
+        return [self.propose(together(first, fit))
+                for fit in companions(self.flying, self.linear, first, self.points[i])]
 
     def propose(self, fit: SetFit) -> int:
         """Index of a set, with sizes as proposed if it was not flown yet."""
