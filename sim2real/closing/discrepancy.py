@@ -107,29 +107,59 @@ def describe_unknown(flights: Sequence[Reconstruction], candidates: Bank, eviden
     moved = moved_by(flights[0], evidences[0].flight.parameters, only.nuisances)
     centre = nearer(moved if hypothesis.settled is None else hypothesis.settled.nuisances, only)
     first, n = 1 + len(only.nuisances), len(terms)
-    x, best, covariance = _begun(hypothesis.unknown, terms, flights[0].reach), np.inf, np.zeros((0, 0))
-    step, turn, tried, chosen = np.zeros(n), centre, np.full(n, AT_FIRST), x != 0.0
+    x, best, there = _begun(hypothesis.unknown, terms, flights[0].reach), np.inf, np.zeros((0, 0))
+    move, tried, among = _Move(np.zeros(n), centre, x != 0.0, there, False), np.full(n, AT_FIRST), np.full(n, True)
     for _ in range(ROUNDS):
-        rows = [_rows(flight, only, hypothesis.fit, terms, at, x + step, turn, tried) for flight in flights]
-        gram = with_prior(_products(flights, evidences, rows, tried) / tempering, only, precision, turn)
+        rows = [_rows(flight, only, hypothesis.fit, terms, at, x + move.step, move.turn, tried) for flight in flights]
+        gram = with_prior(_products(flights, evidences, rows, tried) / tempering, only, precision, move.turn)
         tried = np.clip(STANDS_OUT / np.sqrt(np.maximum(np.diag(gram)[first:], 1e-12)), LEAST, 1.0)
-        reduced = reduce(gram, only, np.zeros_like(precision))
-        cost = float(reduced[0, 0]) + SHOWN**2 * np.count_nonzero(x + step)
-        if best < cost < best + SETTLED and np.any(step):
+        left = float(reduce(gram, only, np.zeros_like(precision))[0, 0])
+        cost = left + SHOWN**2 * np.count_nonzero(x + move.step)
+        if best < cost < best + SETTLED and np.any(move.step) and not move.others:
             break
-        if cost > best and np.any(step):  # too far: half the way from where it was better
-            step, turn = 0.5 * step, 0.5 * (turn + centre)
+        if cost > best and np.any(move.step):  # too far: half the way; or other terms say it no better
+            among = x != 0.0 if move.others else among
+            move = _moved(there, only, x, centre, among, n) if move.others else move.halved(centre)
             continue
         gained = best - cost
-        x, best, centre = x + step, cost, turn
-        target, chosen, covariance = choose(reduced, first, x, int(np.count_nonzero(chosen)) + MORE)
-        step = target - x
-        weights = {first + j: float(step[j]) for j in range(n)}
-        turn = nearer(centre + nuisance_mean(gram, only, weights), only)
-        if gained < SETTLED and np.array_equal(chosen, x != 0.0):
+        x, best, centre, there = x + move.step, cost, move.turn, gram
+        move = _moved(gram, only, x, centre, among, int(np.count_nonzero(move.chosen)) + MORE)
+        if gained < SETTLED and np.array_equal(move.chosen, x != 0.0):
             break
-    settled = Settled(turn, _covariance(gram, first, chosen))
-    return replace(_written(component, terms, at, x + step, chosen, covariance), settled=settled)
+    settled = Settled(move.turn, _covariance(gram, first, move.chosen))
+    return replace(_written(component, terms, at, x + move.step, move.chosen, move.covariance), settled=settled)
+
+
+@dataclass(frozen=True)
+class _Move:
+    """A step of the terms [terms] and where nuisances go with it [n]; the terms chosen, and their covariance.
+
+    others: whether any of them was not there before.
+    """
+
+    step: FloatArray
+    turn: FloatArray
+    chosen: NDArray[np.bool_]
+    covariance: FloatArray
+    others: bool
+
+    def halved(self, centre: FloatArray) -> _Move:
+        """Half of it, nuisances from `centre`."""
+        return replace(self, step=0.5 * self.step, turn=0.5 * (self.turn + centre))
+
+
+def _moved(gram: FloatArray, only: Bank, x: FloatArray, centre: FloatArray, among: NDArray[np.bool_], most: int
+           ) -> _Move:  # fmt: skip
+    """What inner products say of where to go from terms `x` and nuisances `centre` [n].
+
+    Args:
+        among, most: of `choose`.
+    """
+    first, n = 1 + len(only.nuisances), len(centre)
+    target, chosen, covariance = choose(reduce(gram, only, np.zeros((n, n))), first, x, most, among)
+    weights = {first + j: float(v) for j, v in enumerate(target - x)}
+    turn = nearer(centre + nuisance_mean(gram, only, weights), only)
+    return _Move(target - x, turn, chosen, covariance, bool(np.any(chosen & (x == 0.0))))
 
 
 def _covariance(gram: FloatArray, first: int, chosen: NDArray[np.bool_]) -> FloatArray:
@@ -198,9 +228,11 @@ def _rows(flight: Reconstruction, only: Bank, known: SetFit, terms: Sequence[Cho
     return effects.with_effects(rows, values)
 
 
-def choose(reduced: FloatArray, first: int, x: FloatArray, most: int
+def choose(reduced: FloatArray, first: int, x: FloatArray, most: int, among: NDArray[np.bool_] | None = None
            ) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:  # fmt: skip
     """Stepwise choice among terms, `most` of them, from inner products whose row 0 is the residual with `x` of them.
+
+    `among`: which there are to choose from; all if omitted.
 
     Returns:
         Sizes of all terms (zero where not chosen), which were chosen, and the covariance of those.
@@ -219,7 +251,7 @@ def choose(reduced: FloatArray, first: int, x: FloatArray, most: int
         return float(t[subset] @ np.linalg.solve(block, t[subset])) - SHOWN**2 * len(subset)
 
     for _ in range(2 * n):
-        tried = [sorted({*model} ^ {j}) for j in range(n)]  # one more, or one less
+        tried = [sorted({*model} ^ {j}) for j in range(n) if among is None or among[j]]  # one more, or one less
         best = max((subset for subset in tried if len(subset) <= most), key=gain)
         if gain(best) <= gain(model) and model:
             break

@@ -66,8 +66,10 @@ class Nuisance:
         step = size * self.factor
         for name in self.parameter.split("+"):
             now = rows[name][row]
-            if self.absolute or self.about is not None:
-                moved = now + step * (1.0 if self.about is None else self.about)
+            if self.absolute:
+                moved = now + step
+            elif self.about is not None:
+                moved = now + step * self.about
             else:
                 moved = now * np.maximum(1.0 + step, LEAST)
             rows[name][row] = np.maximum(moved, 0.0) if name.endswith("_lag") else moved

@@ -34,6 +34,7 @@ from sim2real.signatures.evidence import Evidence
 SPREADS = (0.1, 0.3, 1.0)
 ROUNDS = 3  # times that sizes which vary are flown
 VARIES = 0.1  # prior probability that a size is not the same everywhere (assumed)
+INEXACT = 0.01  # of a size: what no model is exact enough to tell a change by, stretch by stretch (assumed)
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ def _stepped(flight: Reconstruction, candidates: Bank, nuisances: FloatArray, fi
 def _likeliest(gram: FloatArray, m: int, fit: SetFit, tried: Sequence[Way]) -> tuple[Way, FloatArray, FloatArray]:
     """Of the `m`-th size: the likeliest way, departures of all stretches from the estimate [T], their standard errors.
 
-    The common sizes of all effects are free to give way.
+    The common sizes of all effects are free to give way, and every stretch by what is INEXACT, in any way.
     """
     k, steps = len(fit.families), size_steps(fit, np.array(fit.estimate))
     count = (len(gram) - 1) // k
@@ -133,14 +134,15 @@ def _likeliest(gram: FloatArray, m: int, fit: SetFit, tried: Sequence[Way]) -> t
     found = list[tuple[float, Way, FloatArray, FloatArray]]()
     for way in tried:
         prior = np.log(1.0 - VARIES if way is tried[0] else VARIES / (len(tried) - 1) / len(SPREADS))
-        for spread in SPREADS if way.columns.shape[1] else SPREADS[:1]:
-            moves = np.zeros((count * k, k + way.columns.shape[1]))
+        own = way.columns.shape[1]
+        for spread in SPREADS if own else SPREADS[:1]:
+            moves = np.zeros((count * k, k + own + count))
             moves[:, :k] = np.tile(np.diag(1.0 / steps), (count, 1))
-            moves[m::k, k:] = way.columns / steps[m]
-            deviation = np.r_[ranges(fit), np.full(way.columns.shape[1], spread * size)]
+            moves[m::k, k:] = np.hstack([way.columns, np.eye(count)]) / steps[m]
+            deviation = np.r_[ranges(fit), np.full(own, spread * size), np.full(count, INEXACT * size)]
             log, mean, covariance = gaussian(gram, moves * deviation)
             told = np.zeros((count, len(deviation)))
-            told[:, m], told[:, k:] = 1.0, way.columns
+            told[:, m], told[:, k : k + own] = 1.0, way.columns
             told *= deviation
             variance = np.einsum("ti,ij,tj->t", told, covariance, told)
             found.append((log + prior, way, told @ mean, np.asarray(np.sqrt(variance), np.float64)))
