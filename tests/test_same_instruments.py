@@ -10,9 +10,9 @@ import pytest
 from icing_env.aircraft import load
 from icing_env.record import FlightRecord, RecordMeta, read
 from sim2real.baseline.loading import CENTRE, INERTIA, of_another_loading, otherwise_loaded
-from sim2real.baseline.references import Baseline, uncertain
+from sim2real.baseline.references import Baseline, directions, uncertain
 from sim2real.diagnosis import diagnose
-from sim2real.library.candidates import SIGNED, SPREAD, TOLD_ONCE, nuisances, shifted
+from sim2real.library.candidates import SIGNED, SPREAD, TOLD_ONCE, bank, nuisances, shifted
 from testbed.withheld.conditions import Conditions
 from testbed.withheld.files import record_text, side_text
 from testbed.withheld.flights import Aircraft, recorded
@@ -75,6 +75,9 @@ def test_deviations_of_such_numbers_add():
     for name in SIGNED:
         assert twice[name][0] == pytest.approx(both[name][0])
         assert both[name][0] == pytest.approx((1.0 - 3.4 * TOLD_ONCE[name]) * row[name][0])
+    fitted = shifted(row, directions(bank()), np.array([move.name in SIGNED for move in directions(bank())]), "torque")
+    for name in SIGNED:  # of reference flights, in steps of that size
+        assert fitted[name][0] - row[name][0] == pytest.approx(TOLD_ONCE[name] * abs(row[name][0]))
 
 
 def loaded(mass: float | None, inertia: float = 1.0) -> FlightRecord:
