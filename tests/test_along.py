@@ -128,3 +128,11 @@ def test_thrust_is_read_through_the_wind(flight: Reconstruction) -> None:
     thrust = [MEASURED.index(f"thrust_{side}") for side in SIDES]
     found = flown.fly(round(5.0 / flight.dt))[:, :, thrust]
     np.testing.assert_allclose(found, np.repeat(found[:, :1], 4, axis=1), rtol=1e-3)  # a little: they climb apart
+
+
+def test_rows_that_share_parameters_are_not_flown(flight: Reconstruction) -> None:
+    """Enough to linearise; the loop would read past their one row."""
+    shared = Predictor(flight, flight.parameters, 3)
+    shared.place(0)
+    with pytest.raises(ValueError, match="3 rows need a PARAMETERS row each"):
+        shared.fly(1)
