@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from icing_env import scenario
+from icing_env.aircraft import load
 from icing_env.record import FlightRecord
 from sim2real.diagnosis import diagnose
 from sim2real.flown.settling import likeliest_explained
@@ -14,14 +15,15 @@ from sim2real.prediction.gusts import KINDS, LATER, Kind
 from sim2real.prediction.kalman import gains
 from sim2real.prediction.predictor import TANGENT, innovations
 from sim2real.records.reconstruct import reconstruct
-from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
+from sim2real.signatures.gust_intensity import SIGMAS, choose_gain, kind_at_first
 from testbed.flight import fly
 
 
 @cache
-def flown(seed: int, sigma: float, kind: Kind = LATER) -> FlightRecord:
+def flown(seed: int, sigma: float, kind: Kind = LATER, stability: float = 1.0) -> FlightRecord:
+    """`stability`: share of the published Cm_alpha that the aircraft has."""
     weather = {"turbulence_sigma_w": sigma, "turbulence_tail_delay": float(kind.tail_delay),
-               "turbulence_rotation": float(kind.rotation)}
+               "turbulence_rotation": float(kind.rotation), "Cm_alpha": stability * float(load()["Cm_alpha"][0])}
     chosen = scenario.load("clear_air", duration=52.0, parameters=weather)
     return fly(chosen, seed=seed, observer=False, protection=False).record
 
@@ -47,6 +49,13 @@ def test_the_kind_of_gusts_is_told(sigma, kind):
     (gain,) = likeliest_explained([flight], [choose_gain(flight, SIGMAS)], [()])
     assert gain.gusts.kind == kind
     assert gain.sigma == pytest.approx(sigma, rel=0.25)
+
+
+@pytest.mark.parametrize("kind", [LATER, KINDS[2]])
+@pytest.mark.parametrize("sigma", [1.0, 1.8])
+def test_the_kind_is_told_of_an_aircraft_with_a_gap_before_anything_is_known(sigma, kind):
+    """With the gap, which is no gust, only the strongest gusts make sense of 1.8 m/s, whichever kind they are of."""
+    assert kind_at_first([reconstruct(flown(5, sigma, kind, 0.7))]) == kind
 
 
 @pytest.mark.parametrize(("kind", "taken_for"), [(KINDS[1], KINDS[3]), (KINDS[3], KINDS[1])])

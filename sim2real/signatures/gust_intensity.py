@@ -61,16 +61,19 @@ def kind_at_first(flights: Sequence[Reconstruction], usual: Kind = LATER) -> Kin
 
 
 def _at_first(flight: Reconstruction) -> list[float]:
-    """Log likelihood of a sample by kind of gusts beyond that of LATER, less what is asked; else as `_in_favour`."""
+    """Log likelihood of a sample by kind of gusts beyond that of LATER, less what is asked.
+
+    Also where only the strongest gusts make sense: what is not understood passes for gusts of either kind, and a gap
+    beside gusts that meet all of the aircraft at once is what makes them look strong.
+    """
     out = list[float]()
     for kind in STRAIGHT:
-        options = gains(flight, SIGMAS[::2], kind)
+        options = gains(flight, SIGMAS[1::2], kind)
         scores = likelihoods(flight, options)
         best = options[int(np.argmax(scores))]
         if kind == LATER and best.sigma < CALM:
             return [0.0] * len(STRAIGHT)
-        score = max(scores) - asked(best)
-        out.append(min(score, out[0]) if out and best is options[-1] else score)
+        out.append(max(scores) - asked(best))
     return [score - out[0] for score in out]
 
 
