@@ -13,6 +13,7 @@ from icing_env import effects, scenario
 from icing_env.aircraft import load
 from icing_env.types import DERIVATIVE_NAMES
 from sim2real.baseline.references import Baseline
+from sim2real.closing.whole_model import changed_places
 from sim2real.flown import other_form as in_form
 from sim2real.flown.other_form import Bent, bring, flown_unknown
 from sim2real.flown.points import Flying
@@ -21,7 +22,7 @@ from sim2real.library import candidates as library
 from sim2real.library.bends import bends, changes
 from sim2real.library.candidates import bank
 from sim2real.library.terms import BEYOND, GENERIC, GENERIC_SIZE, Term, in_common, pushes, values_of
-from sim2real.posterior.form import Form
+from sim2real.posterior.form import Form, home
 from sim2real.posterior.generic import fit_unknown
 from sim2real.posterior.home_terms import gain
 from sim2real.posterior.sets import SetFit
@@ -148,6 +149,16 @@ def flights() -> list[Reconstruction]:
                                parameters={"turbulence_sigma_w": 0.0})
         made.append(reconstruct(fly(chosen, seed=3, observer=False, protection=False).record))
     return made
+
+
+@pytest.mark.parametrize(("name", "least"), [("thrust_loss", 0.01), ("asymmetric_thrust", 0.1), ("mass_error", 0.1),
+                                             ("wing_ice", 0.1), ("elevator_power", 0.1)])  # fmt: skip
+def test_what_an_effect_does_to_forces_and_moments_is_at_its_home(flights, name, least):
+    """Lost thrust takes little lift with it, by the slipstream on the wing: of a large loss, that shows."""
+    size = effects.get(name).neutral() | {p.name: p.typical for p in effects.get(name).parameters if p.typical}
+    changed = changed_places(flights, {name: size})
+    most = max(changed.values())
+    assert most > 0.0 and {place for place, rms in changed.items() if rms > least * most} <= home([name])
 
 
 def course(flight: Reconstruction, name: str) -> np.ndarray:

@@ -147,7 +147,7 @@ def fit_whole_model(flights: Sequence[Reconstruction], candidates: Bank, posteri
     for number, change in zip(numbers, size, strict=True):
         values.setdefault(number.effect, effects.get(number.effect).neutral())[number.parameter] = float(change)
     values["discrepancy"] = values.pop("discrepancy")  # last: terms are as large as told, by no effect's factor
-    places = _places(flights, values)
+    places = changed_places(flights, values)
     surest = [i for i in np.argsort(-np.abs(size) / error) if abs(size[i]) > SHOWN * error[i]
               and abs(x[i]) > PLAIN and places.get(_place(numbers[i].move), 1.0) > SEEN]  # fmt: skip
     plain = [i for i in surest if numbers[i].family is not None]
@@ -195,8 +195,12 @@ def _place(move: Nuisance) -> str:
     return COMPONENTS.get(move.parameter.partition("_")[0], "")
 
 
-def _places(flights: Sequence[Reconstruction], values: Values) -> dict[str, float]:
-    """How much the model is changed at each force and moment, both asked for the measured states."""
+def changed_places(flights: Sequence[Reconstruction], values: Values) -> dict[str, float]:
+    """How much the model is changed at each force and moment, both asked for the measured states.
+
+    Returns:
+        RMS change by component: tolerances of ax, ay, az, and of the rate that a moment makes in half a second.
+    """
     squares, count = np.zeros(len(PUSHED)), 0
     for flight in flights:
         changed = replace(flight, parameters=effects.with_effects(flight.parameters, values))

@@ -37,9 +37,10 @@ DIRECTIONS = 20.0  # in which such a remainder lies for every component at home 
 LUCK = 15.0  # whitened square that a free course at one component takes by luck (deviation of 120 knots' chance)
 WORTH = 20.0  # log evidence that terms have to add, to be flown
 LEAST = 3.0  # whitened size of a set's signature below which its form does not matter
-# Generic terms by which an effect that enters at a component may differ from the library's.
+# Generic terms by which an effect that enters at a component may differ from the library's; thrust lifts, too, through
+# the slipstream.
 ALIKE = {
-    "propulsion": ("propulsion", "x_force", "pitching_moment", "yawing_moment"),
+    "propulsion": ("propulsion", "x_force", "z_force", "pitching_moment", "yawing_moment"),
     "mass": ("x_force", "z_force", "pitching_moment", "rolling_moment", "yawing_moment"),
     "wind": ("wind", "x_force", "y_force", "z_force", "sensor:airspeed", "sensor:alpha", "sensor:beta",
              "sensor:altitude"),
