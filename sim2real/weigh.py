@@ -10,6 +10,7 @@ import numpy as np
 from icing_env.record import FloatArray
 from sim2real.actuators.lateness import lateness
 from sim2real.actuators.wandering import wandering
+from sim2real.baseline.quasi_steady import LOSES
 from sim2real.baseline.references import Baseline
 from sim2real.baseline.spread import likeliest, of_spread, spread_beside
 from sim2real.flown.companions import leading
@@ -35,7 +36,6 @@ from sim2real.signatures.tempering import noise, temper, total
 
 RELINEARISE = 8.0  # whitened distance of the fitted nuisances beyond which all is flown again about them
 AGAIN = 2  # times at most
-LOSES = 1.1  # times what the best explanation left, that it leaves with gains found with it: it lost the record
 ADEQUATE = 2.0  # times the noise that is left, up to which the model lacks no more than what is looked for (assumed)
 CALMER = 0.6  # ratio of temperings below which the leading explanations are flown again
 Progress = Callable[[str], None]
