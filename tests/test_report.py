@@ -18,9 +18,10 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from icing_env.errors import InputError
-from testbed.reports.diagnosis import caption_of_terms
+from sim2real.where import REGIME_VARIABLES
+from testbed.reports.diagnosis import caption_of_terms, regime_row
 from testbed.reports.page import Report, figure_source, format_cell
-from testbed.reports.plot_style import KNOT, ROLES, SCALES
+from testbed.reports.plot_style import KNOT, ROLES, SCALES, scale_of
 from testbed.reports.plotting import derivative_dots, estimate_history, gap_bars, time_histories
 
 T = np.linspace(0.0, 10.0, 101)
@@ -260,3 +261,12 @@ def test_a_table_of_terms_says_whether_the_reports_aircraft_has_them():
     assert "terms of elevator_path (static), told and not flown;" in caption_of_terms(terms, "What is there", False)
     assert "not flown" not in caption_of_terms(terms, "What is there", True)
     assert "not flown" not in caption_of_terms(terms | {"places": {}}, "What is there", False)
+
+
+def test_regimes_are_told_in_the_units_of_charts_and_nothing_as_nothing():
+    row = regime_row({"variable": "alpha", "low": 0.1, "high": 0.2, "excess": 0.3, "channels": {"q": 0.4}})
+    assert row == ["α", pytest.approx(5.729578), pytest.approx(11.459156), "deg", 0.3, "q"]
+    still = regime_row({"variable": "rudder", "low": -3.6e-19, "high": 3.6e-19, "excess": 0.3, "channels": {}})
+    assert [format_cell(cell) for cell in still[1:4]] == ["0", "0", "deg"] and still[5] == "-"
+    units = {name: scale_of(name).unit for name in REGIME_VARIABLES}
+    assert all(units.values()), units

@@ -22,7 +22,7 @@ from sim2real.words import listed, of_the_model, sentences, term_named
 from testbed.commands.common import plain
 from testbed.reports.diagnosis_figures import bars, heat, ladder_gaps, regime_heat, size_histories
 from testbed.reports.given import taken_as_given
-from testbed.reports.page import Report
+from testbed.reports.page import Cell, Report
 from testbed.reports.plot_style import scale_of
 from testbed.reports.plotting import gap_bars, time_histories
 from testbed.reports.surface_answers import answer, by_surface, suspected
@@ -137,10 +137,17 @@ def _where(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:
                       "root mean square error over what noise and gusts make. Dots: beyond chance (false discoveries "
                       "5 %).")
     if result["where"]["regimes"]:
-        report.table(["variable", "from", "to", "excess", "channels"],
-                     [[scale_of(r["variable"]).label, r["low"], r["high"], r["excess"], ", ".join(r["channels"]) or "-"]
-                      for r in result["where"]["regimes"][:10]],
+        report.table(["variable", "from", "to", "unit", "excess", "channels"],
+                     [regime_row(r) for r in result["where"]["regimes"][:10]],
                      "Regimes in which one-step predictions err by more than noise and gusts (mean square less one).")
+
+
+def regime_row(regime: Mapping[str, Any]) -> list[Cell]:
+    """A stretch of flight that stands out: its variable, edges as charts show them, excess, and channels."""
+    shown = scale_of(regime["variable"])
+    # a surface that nobody moved is some 1e-19 rad off
+    low, high = (round(regime[edge] * shown.factor + shown.offset, 6) + 0.0 for edge in ("low", "high"))
+    return [shown.label, low, high, shown.unit or "-", regime["excess"], ", ".join(regime["channels"]) or "-"]
 
 
 def _paths(report: Report, found: Diagnosis, result: Mapping[str, Any]) -> None:

@@ -72,7 +72,8 @@ SCALES: dict[str, Scale] = {
     "lwc": Scale("liquid water", "g/m³", 1.0e3), "mvd": Scale("drop size", "µm", 1.0e6),
     "pressure": Scale("pressure", "hPa", 1.0e-2), "mass": Scale("mass", "kg"), "ice": Scale("water met", "kg/m²"),
     "severity": Scale("severity", ""), "confidence": Scale("confidence", "%", 100.0),
-    "excess_drag": Scale("excess drag", "counts", 1.0e4),
+    "excess_drag": Scale("excess drag", "counts", 1.0e4), "power": Scale("power", "kW", 1.0e-3),
+    "time": Scale("time", "s"),
 }  # fmt: skip
 
 
