@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -48,6 +49,20 @@ def test_an_answer_without_effects_leaves_the_gap_as_it_was(key):
         assert found["after"] == pytest.approx(key["held_out"]["before"])
         assert found["own_after"] == pytest.approx(key["held_out"]["own_before"])
         assert found["flown"] == {} and found["not_flown"] == []
+
+
+def test_an_answer_that_another_took_the_place_of_is_flown_again_and_no_other(key, tmp_path, monkeypatch):
+    answers, keys, out = (tmp_path / name for name in ("answers", "keys", "out"))
+    for folder in (answers, keys):
+        folder.mkdir()
+    (keys / "a.json").write_text(json.dumps(key))
+    flown = []
+    monkeypatch.setattr(refly, "gap_of", lambda model, flights, own: flown.append(model) or 0.0)
+    for size, flights in ((0.1, 3), (0.1, 3), (0.2, 6)):
+        (answers / "a.json").write_text(json.dumps(answer("lift_slope", change=size)))
+        refly.refly(answers, keys, out)
+        assert len(flown) == flights
+        assert json.loads((out / "a.json").read_text())["flown"] == {"lift_slope": size}
 
 
 def test_every_parameter_of_the_library_can_be_flown():

@@ -57,7 +57,7 @@ def of_one_solver(given: Iterable[Path]) -> None:
         sources = read_json(path).get("provenance", {}).get("sources", own)
         if sources != own:
             raise InputError(f"{path}: the answer of another solver (sources {sources}, these are {own}): give another "
-                             "--out, or remove the answers, and refly beside them, to have the cases answered again")
+                             "--out, or remove the answers, to have the cases answered again")
 
 
 @contextmanager

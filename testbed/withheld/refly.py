@@ -2,7 +2,8 @@
 
 `python -m testbed.withheld.refly ANSWERS KEYS OUT`, once the keys are open. The published aircraft with what an answer
 changes by its command (effects in the library's form, derivatives, terms beside), on the generator's plant, flies the
-windows of `windows.py`; one file per single effect or pair goes to OUT, where the scorer reads it. What is there stays.
+windows of `windows.py`; one file per single effect or pair goes to OUT, where the scorer reads it. What is there of the
+same command stays.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ Parts = tuple[tuple[str, str, float], ...]
 
 def refly(answers: Path, keys: Path, out: Path, workers: int = 1,
           progress: Callable[[str], None] = lambda text: None) -> None:
-    """Write OUT/NAME.json for every answered case of FLOWN_AGAIN that has none.
+    """Write OUT/NAME.json for every answered case of FLOWN_AGAIN that has none of its answer's command.
 
     Args:
         answers, keys: folders with one JSON file per case.
@@ -54,13 +55,18 @@ def refly(answers: Path, keys: Path, out: Path, workers: int = 1,
     """
     out.mkdir(parents=True, exist_ok=True)
     left = [path for path in sorted(answers.glob("*.json"))
-            if not (out / path.name).is_file() and read_json(keys / path.name)["tier"] in FLOWN_AGAIN]
+            if read_json(keys / path.name)["tier"] in FLOWN_AGAIN and not _flown(path, out / path.name)]
     if workers == 1 or not left:
         done = map(_one, left, repeat(keys), repeat(out))
         _tell(done, len(left), progress)
         return
     with processes(workers) as pool:
         _tell(pool.map(_one, left, repeat(keys), repeat(out), chunksize=8), len(left), progress)
+
+
+def _flown(answer: Path, there: Path) -> bool:
+    """Whether a file holds what an answer's command does, and not that of an answer that was there before."""
+    return there.is_file() and read_json(there).get("command") == command_of(read_json(answer))
 
 
 def _tell(done: Any, total: int, progress: Callable[[str], None]) -> None:
@@ -79,7 +85,7 @@ def flown_again(answer: dict[str, Any], key: dict[str, Any]) -> dict[str, Any]:
     Returns:
         `after` of all that the answer changes, `effects_after` of its effects alone, both from the published aircraft;
         `own_after` of these from the aircraft's own derivatives and mass; `flown`: the effects, `not_flown`: what the
-        generator has no number for.
+        generator has no number for; `command`: of the answer.
     """
     model = told(answer)
     design = Design(key["tier"], true_parts(key), **key["design"])
@@ -90,7 +96,13 @@ def flown_again(answer: dict[str, Any], key: dict[str, Any]) -> dict[str, Any]:
     return {"after": gap_of(Aircraft(model.factors, model.parts, model.terms), flights, own),
             "effects_after": gap_of(Aircraft(parts=model.parts), flights, own),
             "own_after": gap_of(Aircraft(design.baseline, model.parts), flights, own),
-            "flown": {name: size for name, _, size in model.parts}, "not_flown": list(model.lacking)}
+            "flown": {name: size for name, _, size in model.parts}, "not_flown": list(model.lacking),
+            "command": command_of(answer)}
+
+
+def command_of(answer: dict[str, Any]) -> str:
+    """The command by which the simulator flies what an answer says; nothing where it says nothing."""
+    return str(answer.get("resimulate", {}).get("command", ""))
 
 
 def true_parts(key: dict[str, Any]) -> Parts:
@@ -120,7 +132,7 @@ def told(answer: dict[str, Any]) -> Told:
     """What the command of an answer says; nothing where there is none."""
     parts, factors, terms = list[tuple[str, str, float]](), dict[str, float](), dict[str, float]()
     lacking = list[str]()
-    for name, values in _effects(answer.get("resimulate", {}).get("command", "")):
+    for name, values in _effects(command_of(answer)):
         if name == "derivatives":
             factors |= {key: value if key in SENSOR_KNOBS else 1.0 + value for key, value in values.items()}
         elif name == "discrepancy":
