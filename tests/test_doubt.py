@@ -15,7 +15,16 @@ from sim2real.over_time.varying import varying
 from sim2real.posterior.forgiveness import ELSEWHERE, _in_larger, _leaking, elsewhere
 from sim2real.posterior.form import SHARES
 from sim2real.posterior.generic import UnknownFit
-from sim2real.posterior.hypotheses import DOUBT, MOST_DOUBT, Hypothesis, Posterior, doubt, doubted, normalised
+from sim2real.posterior.hypotheses import (
+    DOUBT,
+    MOST_DOUBT,
+    UNSEEN,
+    Hypothesis,
+    Posterior,
+    doubt,
+    doubted,
+    normalised,
+)
 from sim2real.posterior.sets import SetFit
 
 SOMETHING = UnknownFit("x_force", 0.0, (("1", 1.0, 0.1),), 0.0, {})
@@ -36,7 +45,8 @@ def test_doubt_keeps_the_order_of_what_is_certain_and_sums_to_one(logs):
     found = normalised(some(logs), 0.0)
     after = doubted(found)
     assert sum(h.probability for h in after) == pytest.approx(1.0)
-    assert all(h.probability >= (1.0 - DOUBT) * before.probability - 1e-12
+    doubts = doubt(found[0]) if found[0].things else 0.0
+    assert all(h.probability >= (1.0 - doubts) * before.probability - 1e-12
                for before in found for h in after if h.log_posterior == before.log_posterior)
     if found[0].probability > 0.6:
         assert after[0].log_posterior == found[0].log_posterior
@@ -63,8 +73,13 @@ def test_doubt_grows_as_the_library_s_own_form_fails(regained, more):
 
 def test_doubt_grows_with_the_causes_that_are_named():
     single, pair, three = told("wing_ice"), told("roll_trim", "wing_ice"), told("cg_shift", "roll_trim", "wing_ice")
-    assert doubt(told(unknown=SOMETHING)) == doubt(single) < doubt(pair) < doubt(three)
+    assert doubt(single) < doubt(pair) < doubt(three)
     assert doubt(told("wing_ice", unknown=SOMETHING)) == doubt(three)
+
+
+def test_what_seems_unknown_is_doubted_more_than_a_known_effect():
+    """Of 200 opened answers 168 were right, of 249 of a known effect in the library's form 243."""
+    assert doubt(told("wing_ice")) < doubt(told(unknown=SOMETHING)) < doubt(told("wing_ice", unknown=SOMETHING))
 
 
 @pytest.mark.parametrize(("best", "parts"), [
@@ -83,15 +98,34 @@ def test_what_is_doubted_of_several_causes_is_mostly_one_of_them(best, parts):
     assert sum(found.values()) == pytest.approx(1.0)
 
 
-def test_what_another_form_explains_is_doubted_more():
-    exact, bent = (doubted(normalised([Hypothesis(SetFit(), None, -1.0, 0.0),
-                                       Hypothesis(SetFit(), SOMETHING, -2.0, 300.0 - r, regained=r),
-                                       Hypothesis(SetFit(), SOMETHING, -3.0, 100.0)], 0.0)) for r in (0.0, 200.0))
-    assert exact[0].probability == pytest.approx(1.0 - doubt(exact[0]), abs=0.01)
-    assert bent[0].probability == pytest.approx(1.0 - doubt(bent[0]), abs=0.02)
+def test_what_another_form_explains_is_doubted_more_and_half_of_that_is_for_something_unknown():
+    def weighed(regained: float) -> dict[tuple[tuple[str, ...], bool], float]:
+        after = doubted(normalised([told(log=0.0), told("wing_ice", log=300.0 - regained, regained=regained),
+                                    told("fin_ice", log=100.0), told("wing_ice", unknown=SOMETHING, log=90.0),
+                                    told(unknown=SOMETHING, log=10.0)], 0.0))
+        return {(h.effects, h.unknown is not None): h.probability for h in after}
+
+    exact, bent = weighed(0.0), weighed(200.0)
+    for found, share in ((exact, DOUBT), (bent, MOST_DOUBT)):
+        assert found[("wing_ice",), False] == pytest.approx(1.0 - share, abs=0.01)
+        assert found[("wing_ice",), True] < 0.1 * share  # never something unknown beside what is told
+        assert found[(), False] < 0.001
+    assert exact[(), True] < 0.01
+    assert bent[(), True] - exact[(), True] == pytest.approx(0.5 * (MOST_DOUBT - DOUBT), abs=0.015)
 
 
-def test_no_gap_is_not_doubted():
+@pytest.mark.parametrize(("log", "gap", "unknown"), [(-1.0, 0.2, UNSEEN), (-4.0, 0.02, 0.0134), (-12.0, 7e-6, 5e-6)])
+def test_no_gap_is_not_doubted_but_of_the_rest_something_unknown_may_be_most(log, gap, unknown):
+    """Of 451 clean answers at more than 0.95 nine had something unknown, three an effect."""
+    found = normalised([told(log=0.0), told("wing_ice", log=log), told(unknown=SOMETHING, log=log - 5.0)], 0.0)
+    after = {(h.effects, h.unknown is not None): h.probability for h in doubted(found)}
+    assert after[(), False] == found[0].probability
+    assert 0.5 * gap < 1.0 - after[(), False] < 2.0 * gap
+    assert after[(), True] == pytest.approx(unknown, rel=0.5)
+    assert sum(after.values()) == pytest.approx(1.0)
+
+
+def test_what_clean_records_say_of_something_unknown_is_not_lowered():
     found = normalised(some([0.5, 0.0, 1.0]), 0.0)
     assert found[0].unknown is None
     assert [h.probability for h in doubted(found)] == [h.probability for h in found]

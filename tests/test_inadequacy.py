@@ -7,9 +7,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from generated import in_still_air
 
 from icing_env.aircraft import load
-from icing_env.record import read
 from sim2real.baseline.inadequacy import colour
 from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import _reconstructed, diagnose
@@ -21,27 +21,12 @@ from sim2real.signatures.evidence import gather
 from sim2real.signatures.means import without_means
 from sim2real.signatures.whitening import SETTLE
 from sim2real.words import of_the_model
-from testbed.withheld.conditions import Conditions
 from testbed.withheld.draw import published_spread
-from testbed.withheld.files import record_text, side_text
-from testbed.withheld.flights import Aircraft, recorded
-from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
+from testbed.withheld.flights import Aircraft
 
 CANDIDATES = bank()
 Q, AX = MEASURED.index("q"), MEASURED.index("ax")
 FLIGHTS, N = 5, 1800
-
-
-def flown(folder, role: str, factors: dict[str, float], seed: int) -> list:
-    """Records of three manoeuvres in still air by the generator's plant."""
-    out = []
-    for i, manoeuvre in enumerate(PLANS[2][:DIAGNOSED]):
-        rng = np.random.default_rng([seed, i])
-        flight, seen = recorded(Aircraft(factors), manoeuvre, 1.15, Conditions(0.0, 1.0, 1.0), rng)
-        (folder / f"{role}{i}.csv").write_text(record_text(seen, flight.commands))
-        (folder / f"{role}{i}.toml").write_text(side_text("x", role))
-        out.append(read(folder / f"{role}{i}.csv"))
-    return out
 
 
 def innovations(seed: int) -> list[SimpleNamespace]:
@@ -76,7 +61,7 @@ def test_a_mean_that_differs_between_flights_leaves_the_changes_their_worth():
 
 
 def test_rows_and_inner_products_lose_the_same_mean(tmp_path):
-    plain = _reconstructed(flown(tmp_path, "diagnose", {}, 1)[:1], Baseline(load(), np.eye(1)), None)[0]
+    plain = _reconstructed(in_still_air(tmp_path, "diagnose", Aircraft(), 1)[:1], Baseline(load(), np.eye(1)), None)[0]
     known = gather(plain, CANDIDATES)
     flight = replace(plain, inadequacy=Inadequacy(1.0, {"q": 4.0}, {"q": 9.0, "altitude": 4.0}))
     less = gather(flight, CANDIDATES, known.gain)
@@ -105,8 +90,8 @@ def test_what_terms_explain_of_clean_flights_is_no_evidence():
 
 def test_an_aircraft_that_the_model_knows_is_disturbed_little_and_has_no_gap(tmp_path):
     """References of an aircraft whose derivatives are off by their published spread, of the other plant."""
-    factors = published_spread(np.random.default_rng(5))
-    clean, again = (flown(tmp_path, role, factors, seed) for role, seed in (("reference", 1), ("diagnose", 2)))
+    aircraft = Aircraft(published_spread(np.random.default_rng(5)))
+    clean, again = (in_still_air(tmp_path, role, aircraft, seed) for role, seed in (("reference", 1), ("diagnose", 2)))
     found = diagnose(again, reference=clean)
     model = found.provenance["model"]
     assert model["walk"] <= 10.0

@@ -6,37 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from generated import in_still_air
 
 from icing_env.aircraft import load
-from icing_env.record import FlightRecord, RecordMeta, read
+from icing_env.record import FlightRecord, RecordMeta
 from sim2real.baseline.loading import CENTRE, INERTIA, of_another_loading, otherwise_loaded
 from sim2real.baseline.references import Baseline, directions, uncertain
 from sim2real.diagnosis import diagnose
 from sim2real.library.candidates import SIGNED, SPREAD, TOLD_ONCE, bank, nuisances, shifted
-from testbed.withheld.conditions import Conditions
-from testbed.withheld.files import record_text, side_text
-from testbed.withheld.flights import Aircraft, recorded
-from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
+from testbed.withheld.flights import Aircraft
 
 BIASES = {"bias_alpha": 2e-3, "bias_beta": -1.5e-3, "bias_q": 5e-4, "bias_az": 0.03, "bias_theta": 1.5e-3}
 
 
-def flown(folder, role: str, aircraft: Aircraft, seed: int) -> list[FlightRecord]:
-    out = []
-    for i, manoeuvre in enumerate(PLANS[2][:DIAGNOSED]):
-        rng = np.random.default_rng([seed, i])
-        flight, seen = recorded(aircraft, manoeuvre, 1.15, Conditions(0.0, 1.0, 1.0), rng)
-        (folder / f"{role}{i}.csv").write_text(record_text(seen, flight.commands))
-        (folder / f"{role}{i}.toml").write_text(side_text("x", role))
-        out.append(read(folder / f"{role}{i}.csv"))
-    return out
-
-
 def test_offsets_that_all_flights_have_are_no_gap_and_one_beside_them_is(tmp_path):
     own = Aircraft(terms=BIASES)
-    clean, again = (flown(tmp_path, role, own, seed) for role, seed in (("reference", 1), ("diagnose", 2)))
+    clean, again = (in_still_air(tmp_path, role, own, seed) for role, seed in (("reference", 1), ("diagnose", 2)))
     assert diagnose(again, reference=clean).verdict == "no_gap"
-    worse = flown(tmp_path, "diagnose", replace(own, parts=(("alpha_bias", "same", 8e-3),)), 3)
+    worse = in_still_air(tmp_path, "diagnose", replace(own, parts=(("alpha_bias", "same", 8e-3),)), 3)
     found = diagnose(worse, reference=clean)
     assert found.hypotheses[0]["effects"] == ["alpha_bias"]
     size = found.effects[0]["parameters"]["offset"]
@@ -47,21 +34,21 @@ def test_offsets_that_all_flights_have_are_no_gap_and_one_beside_them_is(tmp_pat
 def test_without_references_offsets_beyond_a_calibration_are_a_gap(tmp_path, times, gap):
     offsets = {name: times * offset for name, offset in BIASES.items() if name != "bias_q"}  # zeroed at rest
     own = Aircraft(terms=offsets)
-    assert (diagnose(flown(tmp_path, "diagnose", own, 2)).verdict != "no_gap") == gap
+    assert (diagnose(in_still_air(tmp_path, "diagnose", own, 2)).verdict != "no_gap") == gap
 
 
 @pytest.mark.parametrize("number", TOLD_ONCE)
 def test_a_number_that_one_source_tells_may_be_another_without_a_gap(tmp_path, number):
     within, beyond = (Aircraft(baseline={number: 1.0 + times * TOLD_ONCE[number]}) for times in (-1.2, -8.0))
-    assert diagnose(flown(tmp_path, "diagnose", within, 4)).verdict == "no_gap"
-    assert diagnose(flown(tmp_path, "diagnose", beyond, 4)).verdict != "no_gap"
+    assert diagnose(in_still_air(tmp_path, "diagnose", within, 4)).verdict == "no_gap"
+    assert diagnose(in_still_air(tmp_path, "diagnose", beyond, 4)).verdict != "no_gap"
 
 
 @pytest.mark.parametrize("number", SIGNED)
 def test_such_a_number_may_have_the_other_sign_without_a_gap(tmp_path, number):
     """Held at a tenth of the published one, and stepped by parts of what it was moved to, one in nine was a gap."""
     other = Aircraft(baseline={number: 1.0 - 2.5 * TOLD_ONCE[number]})
-    assert diagnose(flown(tmp_path, "diagnose", other, 4)).verdict == "no_gap"
+    assert diagnose(in_still_air(tmp_path, "diagnose", other, 4)).verdict == "no_gap"
 
 
 def test_deviations_of_such_numbers_add():

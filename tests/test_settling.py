@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from generated import written
 
 from icing_env.aircraft import load
-from icing_env.record import read
 from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import _reconstructed
 from sim2real.flown.settling import likeliest, settle
@@ -23,7 +23,6 @@ from sim2real.signatures import gust_intensity
 from sim2real.signatures.gust_intensity import SIGMAS, choose_gain, likelihoods
 from testbed.withheld.conditions import Conditions
 from testbed.withheld.draw import SPREAD, published_spread
-from testbed.withheld.files import record_text, side_text
 from testbed.withheld.flights import Aircraft, recorded
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
 
@@ -39,9 +38,7 @@ def flown(folder, seed: int) -> tuple[list[Reconstruction], dict[str, float]]:
     factors, out = published_spread(rng), []
     for i, manoeuvre in enumerate(PLANS[2][:DIAGNOSED]):
         flight, seen = recorded(Aircraft(factors), manoeuvre, 1.15, Conditions(SIGMA, SCALE, LEVEL), rng)
-        (folder / f"{i}.csv").write_text(record_text(seen, flight.commands))
-        (folder / f"{i}.toml").write_text(side_text("x", "diagnose"))
-        out.append(read(folder / f"{i}.csv"))
+        out.append(written(folder / f"{i}", seen, flight.commands))
     return _reconstructed(out, BASELINE, None), factors
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from generated import written
 from scipy.signal import lfilter
 
-from icing_env.record import read
 from sim2real.diagnosis import _reconstructed, diagnose
 from sim2real.records.channels import MEASURED
 from sim2real.records.reconstruct import Reconstruction, reconstruct
@@ -14,7 +14,6 @@ from sim2real.records.vane_lead import boom_of_vanes, motion
 from testbed.withheld import instruments
 from testbed.withheld import plant as pl
 from testbed.withheld.conditions import Conditions
-from testbed.withheld.files import record_text, side_text
 from testbed.withheld.flights import Aircraft, fly, turbulence
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
 from testbed.withheld.published import PUBLISHED
@@ -35,9 +34,7 @@ def flown(folder, sigma: float, boom: float, count: int = DIAGNOSED) -> list:
             there = np.append(gust[ahead:, column], np.repeat(gust[-1, column], ahead))[:: pl.SUB]
             channels[name] = channels[name] + late((now - there) / manoeuvre.speed)
         seen = instruments.read(channels, 1.0, rng)
-        (folder / f"{i}.csv").write_text(record_text(seen, flight.commands))
-        (folder / f"{i}.toml").write_text(side_text("x", "diagnose"))
-        out.append(read(folder / f"{i}.csv"))
+        out.append(written(folder / f"{i}", seen, flight.commands))
     return out
 
 

@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from generated import written
 
 from icing_env.aircraft import load
-from icing_env.record import read
 from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import _reconstructed
 from sim2real.prediction.as_predicted import as_predicted
@@ -29,7 +29,6 @@ from sim2real.signatures.whitening import SETTLE, whiten, whitening
 from testbed.withheld import conditions, instruments
 from testbed.withheld import plant as pl
 from testbed.withheld.conditions import Conditions
-from testbed.withheld.files import record_text, side_text
 from testbed.withheld.flights import Aircraft, fly, turbulence
 from testbed.withheld.manoeuvres import PLANS
 
@@ -42,9 +41,8 @@ def flown(folder, sigma: float, seed: int, gusts: str = "later") -> Reconstructi
     """The published aircraft, with good instruments."""
     manoeuvre, rng = PLANS[seed % len(PLANS)][seed % 3], np.random.default_rng(seed)
     flight = fly(Aircraft(), manoeuvre, 1.0, turbulence(manoeuvre, Conditions(sigma, 1.0, 1.0, gusts), rng))
-    (folder / "1.csv").write_text(record_text(instruments.read(flight.channels, LEVEL, rng), flight.commands))
-    (folder / "1.toml").write_text(side_text("x", "diagnose"))
-    return _reconstructed([read(folder / "1.csv")], Baseline(load(), np.eye(1)), None)[0]
+    record = written(folder / "1", instruments.read(flight.channels, LEVEL, rng), flight.commands)
+    return _reconstructed([record], Baseline(load(), np.eye(1)), None)[0]
 
 
 @pytest.mark.parametrize(("sigma", "gusts"), [(SIGMAS[0], "later"), (0.5, "later"), (1.5, "later"), (0.5, "turning"),

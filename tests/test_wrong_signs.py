@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from flights import flight_data, lateral, longitudinal, with_channel
+from generated import written
 
 from estimators.signals.data_checks import check
 from estimators.signals.flow_checks import _check_ay_unit, _check_calm_side
@@ -18,7 +19,6 @@ from icing_env.record import FlightRecord, read
 from testbed.flight import fly
 from testbed.withheld import effects
 from testbed.withheld.conditions import Conditions
-from testbed.withheld.files import record_text, side_text
 from testbed.withheld.flights import Aircraft, recorded
 from testbed.withheld.manoeuvres import PLANS
 
@@ -122,10 +122,7 @@ def test_a_late_vane_in_calm_air_does_not_bend_the_factor_of_ay(effect: str, tmp
         rng = np.random.default_rng(plan)
         given = Conditions(0.0, 1.0, 1.5)
         flown, channels = recorded(Aircraft({}, [(effect, "same", size)]), manoeuvre, 1.0, given, rng)
-        path = tmp_path / f"{plan}.csv"
-        path.write_text(record_text(channels, flown.commands))
-        path.with_suffix(".toml").write_text(side_text("f", "diagnose"))
-        record = read(path)
+        record = written(tmp_path / f"{plan}", channels, flown.commands)
         check(record)
         with pytest.raises(InputError, match="'ay' looks like ft/s2"):
             check(with_channel(record, "ay", record["ay"] / 0.3048))

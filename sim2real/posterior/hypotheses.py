@@ -21,11 +21,12 @@ from sim2real.posterior.singles import EffectFit
 # Prior (assumed): what is left is shared by single effects. A pair is about one per cent as likely as either member.
 P_NONE, P_UNKNOWN, P_PAIRS, P_TRIPLES, P_BESIDE = 0.8, 0.02, 0.028, 0.0008, 0.0028
 SAME_PLACE = 0.02  # of that where two members are faults of one device: another form of one is likelier (assumed)
-# Of the probability, that the evidence misleads: where the library's own form of one effect explains a gap, or what is
-# unknown; again for each ten times that another form regains in log evidence, and at most. More where two effects are
-# told, and in all where more are, or something unknown beside them. Chosen on 3,090 opened answers.
-DOUBT, PER_DECADE, MOST_DOUBT = 0.03, 0.02, 0.1
-OF_TWO, OF_MORE = 0.1, 0.5
+# Of the probability, that the evidence misleads: where the library's own form of one effect explains a gap; again for
+# each ten times that another form regains in log evidence, and at most, half of it for something unknown; where that is
+# what explains it; more where two effects are told; and in all where more are, or something unknown beside them. And
+# that something unknown is there where no gap is likeliest. Chosen on 1,630 opened answers (docs/diagnosis_method.md).
+DOUBT, PER_DECADE, MOST_DOUBT = 0.03, 0.08, 0.11
+OF_UNKNOWN, OF_TWO, OF_MORE, UNSEEN = 0.14, 0.1, 0.5, 0.02
 FEWER = 0.5  # of the doubt about several things, that one of them is not there; the rest is as of any (assumed)
 NEXT = 0.8  # of the rest, that it is one of those ranked next, each a third as likely as the one before (assumed)
 RANKED = 1.0 / 3.0
@@ -220,37 +221,61 @@ def normalised(found: Sequence[Hypothesis], least: float = KEPT) -> tuple[Hypoth
 def doubt(told: Hypothesis) -> float:
     """Probability that the best explanation misleads.
 
-    The larger the more its own form fails and another is needed, and where it names several causes: of these, one is
-    often the form of another.
+    The larger where its own form fails and another is needed, and where it names several causes: of these, one is often
+    the form of another. What seems to be nothing that is known is sometimes the form of something that is.
     """
     if told.things > 2 or (told.effects and told.unknown):
         return OF_MORE
-    own = min(DOUBT + PER_DECADE * float(np.log10(1.0 + max(told.regained, 0.0))), MOST_DOUBT)
-    return own + (OF_TWO if told.things > 1 else 0.0)
+    return OF_UNKNOWN if told.unknown else DOUBT + _bent(told) + (OF_TWO if told.things > 1 else 0.0)
+
+
+def _bent(told: Hypothesis) -> float:
+    """What another form of known effects adds to doubt."""
+    return min(PER_DECADE * float(np.log10(1.0 + max(told.regained, 0.0))), MOST_DOUBT - DOUBT)
 
 
 def doubted(found: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
     """Hypotheses of a gap, a share `doubt` of the probability for what the best has too much, or for those ranked next.
 
     What no model has, a filter's noise or a rival's form, is not in the evidence: where that misleads, it is mostly
-    the next in rank that is right, however far behind, or a part of what is told. Where no gap is likeliest nothing is
-    doubted, and what misleads about the kind of a gap makes no gap no likelier.
+    the next in rank that is right, however far behind, or a part of what is told; of one effect in another form as
+    often something unknown, and never something unknown beside what is told. Where no gap is likeliest it is not
+    doubted, but of the rest something unknown may be most; and what misleads about the kind of a gap makes no gap no
+    likelier.
     """
     order = [int(i) for i in np.argsort([-h.log_posterior for h in found], kind="stable")]
     best = found[order[0]]
     if not best.things:
-        return tuple(sorted(found, key=lambda h: -h.probability))
+        return tuple(sorted(_unseen(found), key=lambda h: -h.probability))
     before = softmax([h.log_prior if h.things else -np.inf for h in found])
-    gaps = [i for i in order[1:] if found[i].things]
+    gaps = [i for i in order[1:] if found[i].things and not (found[i].unknown and best.is_part_of(found[i]))]
     after = _by_rank(gaps, len(found)) if gaps else before
     parts = [i for i in gaps if found[i].is_part_of(best)]
     fewer = FEWER if parts else 0.0
     share = doubt(best)
+    strange = [i for i in gaps if not found[i].effects][:1] if len(best.effects) == best.things == 1 else []
+    lacking = 0.5 * _bent(best) if strange else 0.0
     rest = NEXT * after + (1.0 - NEXT) * before
-    spread = share * (fewer * _by_rank(parts, len(found)) + (1.0 - fewer) * rest)
+    spread = (share - lacking) * (fewer * _by_rank(parts, len(found)) + (1.0 - fewer) * rest)
+    spread += lacking * _by_rank(strange, len(found))
     out = [replace(h, probability=(1.0 - share) * h.probability + float(s))
            for h, s in zip(found, spread, strict=True)]
     return tuple(sorted(out, key=lambda h: -h.probability))
+
+
+def _unseen(found: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Hypotheses where no gap is likeliest: something unknown has UNSEEN, or two thirds of all gaps if that is less."""
+    gap, now = (sum(h.probability for h in found if of(h)) for of in (lambda h: h.things, _is_unknown))
+    then = max(now, min(UNSEEN, gap / 1.5))
+    if now <= 0.0 or gap <= now:
+        return list(found)
+    known = (gap - then) / (gap - now)
+    return [replace(h, probability=h.probability * (then / now if _is_unknown(h) else known)) if h.things else h
+            for h in found]
+
+
+def _is_unknown(h: Hypothesis) -> bool:
+    return h.unknown is not None and not h.effects
 
 
 def _by_rank(ranked: Sequence[int], count: int) -> FloatArray:
