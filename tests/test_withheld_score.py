@@ -190,7 +190,7 @@ def test_a_killed_run_goes_on_with_the_answers_it_has(perfect, tmp_path):
     (tmp_path / "keys").chmod(0)  # as a kill leaves it
     (tmp_path / "refly").mkdir()
     for name in names:  # as if flown again before
-        (tmp_path / "refly" / f"{name}.json").write_text('{"after": 0.1, "own_after": 0.1}')
+        (tmp_path / "refly" / f"{name}.json").write_text('{"after": 0.1, "own_after": 0.1, "command": ""}')
     said: list[str] = []
     ledger = tmp_path / "ledger.csv"
     for _ in range(2):

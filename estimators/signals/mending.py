@@ -23,7 +23,8 @@ FEWEST = 20  # samples
 REGULAR = 0.95  # share of a channel's changes that come as regularly as samples: those between are repeats
 FROZEN = 1.0  # s without any change in a channel that otherwise changes
 LONGER = 5.0  # times any other stretch without change
-HELD, REPEATS = ("elevator", "aileron", "rudder"), 2  # may stand still, unless noise always moves them
+HELD, REPEATS = ("elevator", "aileron", "rudder"), 2  # may stand still, unless noise always moves them,
+FLICKERS = 0.04  # or turns them in so many of their samples, as a hand on the yoke and the last bit of a converter do
 # Smallest jump that can be called a spike, in the channel's unit; below it, it does no harm.
 SPIKE_FLOOR = {**dict.fromkeys(("alpha", "beta", "phi", "theta", "psi"), 0.006), **dict.fromkeys(("p", "q", "r"), 0.02),
                **dict.fromkeys(("elevator", "aileron", "rudder"), 0.006), "ax": 0.3, "ay": 0.3, "az": 0.8,
@@ -102,7 +103,7 @@ def _without_frozen(record: FlightRecord) -> FlightRecord:
             continue
         rows = np.flatnonzero(np.isfinite(record[name]))
         start, end, next_longest = _longest_runs(record[name][rows])
-        if name in HELD and next_longest > REPEATS:
+        if name in HELD and next_longest > REPEATS and _turns(record[name][rows], start, end) < FLICKERS:
             continue
         if end - start < LONGER * next_longest or record.time[rows[end]] - record.time[rows[start]] < FROZEN:
             continue
@@ -123,6 +124,13 @@ def _longest_runs(values: FloatArray) -> tuple[int, int, int]:
     longest = int(np.argmax(lengths))
     others = np.delete(lengths, longest)
     return int(edges[longest]), int(edges[longest + 1] - 1), int(others.max()) if len(others) else 0
+
+
+def _turns(values: FloatArray, start: int, end: int) -> float:
+    """Share of the samples outside a stretch at which a channel turns back from where it was going."""
+    ways = [np.sign(np.diff(part)) for part in (values[: start + 1], values[end:])]
+    turned = sum(int(np.count_nonzero(np.diff(way[way != 0.0]))) for way in ways)
+    return turned / max(sum(len(way) for way in ways), 1)
 
 
 def _moves(record: FlightRecord, rows: NDArray[np.intp], names: list[str]) -> bool:

@@ -34,6 +34,7 @@ from sim2real.posterior.singles import DETECTABLE
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.evidence import Evidence, compare
 
+LIKELY = 0.1  # probability of something unknown from which it is described; doubt of a known effect alone leaves 0.06
 SHOWN = DETECTABLE  # standard errors that a term has to stand out
 ROUNDS, SETTLED = 12, 0.5  # of fitting at most, each flying the aircraft described so far; whitened square worth one
 # Units of a term by which its slope is taken at first; then as many as stand out so far: the curvature of a larger step
@@ -76,7 +77,7 @@ class Description:
 
 def described(posterior: Posterior) -> Hypothesis | None:
     """The most probable explanation that holds something unknown, where that is not improbable."""
-    if posterior.unknown < 0.05:
+    if posterior.unknown < LIKELY:
         return None
     return next((h for h in posterior.hypotheses if h.unknown is not None), None)
 
