@@ -34,7 +34,7 @@ from sim2real.posterior.singles import DETECTABLE
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.evidence import Evidence, compare
 
-LIKELY = 0.1  # probability of something unknown from which it is described; doubt of a known effect alone leaves 0.06
+LIKELY = 0.1  # probability of something unknown from which it is described; doubt of a known effect leaves 0.04 to 0.08
 SHOWN = DETECTABLE  # standard errors that a term has to stand out
 ROUNDS, SETTLED = 12, 0.5  # of fitting at most, each flying the aircraft described so far; whitened square worth one
 # Units of a term by which its slope is taken at first; then as many as stand out so far: the curvature of a larger step

@@ -253,7 +253,7 @@ def doubted(found: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
     parts = [i for i in gaps if found[i].is_part_of(best)]
     fewer = FEWER if parts else 0.0
     share = doubt(best)
-    strange = [i for i in gaps if not found[i].effects][:1] if len(best.effects) == best.things == 1 else []
+    strange = [i for i in gaps if _is_unknown(found[i])][:1] if len(best.effects) == best.things == 1 else []
     lacking = 0.5 * _bent(best) if strange else 0.0
     rest = NEXT * after + (1.0 - NEXT) * before
     spread = (share - lacking) * (fewer * _by_rank(parts, len(found)) + (1.0 - fewer) * rest)
