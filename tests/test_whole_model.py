@@ -111,6 +111,9 @@ def test_what_stretches_the_model_is_not_all():
     assert told(3.0, None, none) and not told(1.0, np.full(30, 1.8), none)  # nothing is left in free flight
     assert not told(3.0, np.ones(30), none) and told(3.0, np.full(30, 1.8), none)  # its form in terms was all there was
     assert told(3.0, np.ones(30)) and told(3.0, np.ones(30), none, False)
+    most = replace(much, before=much.after + 40.0)  # of an enormous gap it takes most
+    assert not told(1.0, np.full(30, 1.8), most) and not told(1.0, np.full(30, 3.0), most) and told(3.0, None, most)
+    assert told(1.0, np.full(30, 3.0)) and told(1.0, np.full(30, 3.0), much, False)
     assert told(3.0, None, much, False) and not told(1.0, np.full(30, 1.8), much, False)  # it was not all flown
 
 

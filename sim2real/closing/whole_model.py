@@ -36,8 +36,8 @@ from sim2real.records.reconstruct import Reconstruction
 
 ANOTHER = 2.0  # times the noise that the best explanation leaves (tempering), beyond which it is not all (assumed)
 STRETCHED = 1e-5  # chance of numbers as far from published ones as those that go with it, at which it is not all, too
-ALL = 3.0  # times that square, at which numbers are the gap, whatever they leave in free flight (assumed)
-TAKEN = 0.5  # of the gap in free flight that it leaves: all numbers together leave at most that (assumed)
+ALL = 3.0  # times that square, at which it is not all though noise is all that is left, or it did not all fly (assumed)
+TAKEN = 0.5  # of the gap in free flight that it leaves, at least, and that all numbers leave of this at most (assumed)
 SHARE = 0.6  # probability, at least, that it is they that differ where they do (assumed)
 SHOWN, PLAIN = 3.0, 2.0  # standard errors, and times its published spread, from which a number is told (assumed)
 SEEN = 0.25  # tolerances by which a component is changed, from which its numbers are told (assumed)
@@ -105,15 +105,20 @@ def suspected(posterior: Posterior, precision: FloatArray) -> bool:
 def incomplete(posterior: Posterior, precision: FloatArray, flown: gap.Energy, all_of_it: bool) -> bool:
     """Whether a suspected explanation is not all: numbers too far off, or much left in free flight where noise is left.
 
+    Numbers that only stand in for details of an enormous gap go far, too: what takes most of it is believed.
+
     Args:
         precision: of the numbers' prior.
         flown: the records in free flight, with that explanation; what only stretches the model leaves a gap there too.
             What is told of the noise is told without its form in terms, which may be all that there was left.
         all_of_it: whether all of the explanation flew; what did not leaves a gap there for that reason alone.
     """
-    left = gap.g(flown.after, flown.alone) >= gap.null_quantile(flown.alone)
+    after = gap.g(flown.after, flown.alone)
+    left = after >= gap.null_quantile(flown.alone)
     if posterior.tempering > ANOTHER:
         return left or not all_of_it or posterior.settled is None or _stretched(posterior, precision)
+    if after < TAKEN * gap.g(flown.before, flown.alone):
+        return False
     return (left and all_of_it and _stretched(posterior, precision)) or _stretched(posterior, precision, ALL)
 
 

@@ -178,14 +178,18 @@ class Flying:
         """
         k, n = len(sizes), len(nuisances)
         steps = size_steps(fit, sizes)
-        gram, count = np.zeros((1 + k + n, 1 + k + n)), 1 + k if slopes else 1 + k + n
+        count = 1 + k if slopes else 1 + k + n
         rows = [rows_of(f, self.candidates, fit, sizes, steps, nuisances)[:count] for f in self.flights]
         made = self._flown(rows, keep=range(count))
         slopes = slopes or self._slopes([own[:, 1 + k :] / NUISANCE_STEP for own in made])
         made = [own[:, : 1 + k].copy() for own in made]  # a view would keep what slopes were made of
-        for flight, own, left, lent in zip(self.flights, rows, made, slopes, strict=True):
-            gram += lent.beside(left) / self.tempering
-            gram[: 1 + k, : 1 + k] += path_gram(flight, own[: 1 + k], (), round(SETTLE / flight.dt)) / self.tempering
+
+        def of_record(flight: Reconstruction, own: NDArray, left: FloatArray, lent: Slopes) -> FloatArray:
+            inner = lent.beside(left)
+            inner[: 1 + k, : 1 + k] += path_gram(flight, own[: 1 + k], (), round(SETTLE / flight.dt))
+            return inner
+
+        gram = np.sum(each(of_record, self.flights, rows, made, slopes), axis=0) / self.tempering
         return replace(self._weighed(fit, sizes, nuisances, gram), rows=made, slopes=slopes)
 
     def points(self, sets: Sequence[tuple[SetFit, FloatArray, FloatArray]]) -> list[Point]:
@@ -249,20 +253,23 @@ class Flying:
         terms, k, n = self.candidates.terms, len(point.sizes), len(point.nuisances)
         first = 1 + k + n
         moved = tuple(replace(term, row=first + j) for j, term in enumerate(terms))
-        gram, kept, left_in = np.zeros((first + len(terms),) * 2), [], dict.fromkeys(PATHS, 0.0)
         pushed = self.courses.pushed(point.weights, 1 + k)
         moved_to = [rows_of(flight, self.candidates, fit, point.sizes, point.steps, point.nuisances)[: 1 + k]
                     for flight in self.flights]
         made = self._flown(moved_to, pushed, range(1 + k)) if point.weights else point.rows
-        for flight, rows, own, slopes, (generic, inner) in zip(
-                self.flights, moved_to, made, point.slopes, self.courses.of_terms(), strict=True):
-            for component, over in excess(flight, rows[:1]).items():
-                left_in[component] += over / self.tempering
-            across = np.concatenate([own.T @ generic, slopes.onto])
-            gram += np.block([[slopes.beside(own), across], [across.T, inner]]) / self.tempering
+
+        def of_record(flight: Reconstruction, rows: NDArray, own: FloatArray, slopes: Slopes,
+                      of_terms: tuple[FloatArray, FloatArray]) -> FloatArray:
+            across = np.concatenate([own.T @ of_terms[0], slopes.onto])
             rows = np.take(rows, [*range(1 + k), *[0] * (n + len(terms))])
-            gram += path_gram(flight, rows, moved, round(SETTLE / flight.dt)) / self.tempering
-            kept.append((own, slopes.rows))
+            return np.block([[slopes.beside(own), across], [across.T, of_terms[1]]]) + path_gram(
+                flight, rows, moved, round(SETTLE / flight.dt))
+
+        gram = np.sum(each(of_record, self.flights, moved_to, made, point.slopes, self.courses.of_terms()),
+                      axis=0) / self.tempering
+        over = [excess(flight, rows[:1]) for flight, rows in zip(self.flights, moved_to, strict=True)]
+        left_in = {component: sum(own[component] for own in over) / self.tempering for component in PATHS}
+        kept = [(own, slopes.rows) for own, slopes in zip(made, point.slopes, strict=True)]
         precision = self.baseline.precision
         gram[first - n : first, first - n : first] += precision
         gram[first - n : first, 0] += precision @ point.nuisances

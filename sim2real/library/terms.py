@@ -101,6 +101,7 @@ ERECTION = 30.0  # s in which a vertical gyro follows a false vertical (assumed)
 KNOT_AT = "at:"  # how the hat about a knot is named
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of a record as a model predicts it that departs from it
 def pushes(flight: Reconstruction, terms: Sequence[Term]) -> tuple[Push, ...]:
     """The time courses of the generic terms along one record."""
     scale = _scales(flight)

@@ -14,6 +14,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
+from icing_env.lanes import LANES
 from icing_env.parameters import as_bytes
 from icing_env.record import FloatArray
 from icing_env.simulate import Fleet
@@ -22,6 +23,7 @@ from sim2real.prediction.kalman import Gain
 from sim2real.prediction.predictor import Push, held, listed, lost, put, spare, started, steered, stretch, substeps
 from sim2real.records.channels import MEASURED
 from sim2real.records.reconstruct import Reconstruction
+from sim2real.records.side_by_side import each, threads
 
 
 def end_to_end(rows: Sequence[NDArray]) -> NDArray:
@@ -78,20 +80,33 @@ class _EndToEnd:
         everything = end_to_end([*rows, *[rows[-1][-1:]] * (len(of) - int(at[-1]))])
         variants = held(everything, dt)
         variants["turbulence_tail_delay"], variants["turbulence_rotation"] = self.kinds[of].T
-        fleet = Fleet(variants, len(of), dt, substeps(dt))
-        put(fleet, {name: np.array([start[name] for start in self.starts])[of] for name in self.starts[0]})
         pushed = [replace(q, row=int(at[i]) + q.row, series=self._placed(i, q.series))
                   for i, some in enumerate(pushes) for q in some]  # fmt: skip
-        forces, errors = listed(pushed, dt)
-        steps = max(len(f.time) for f in self.flights) - 1
+        out = np.concatenate(each(lambda part: self._flown(variants[part], of[part], part.start, pushed),
+                                  _parts(len(of))), axis=1)  # fmt: skip
+        return [lost(out[: len(f.time) - 1, at[i] : at[i + 1]], np.isfinite(f.measured[1:]))
+                for i, f in enumerate(self.flights)]
+
+    def _flown(self, variants: NDArray, of: NDArray[np.intp], first: int, pushes: Sequence[Push]) -> FloatArray:
+        """Innovations [steps, rows, channels] of neighbouring rows, the first being `first`, along the records `of`."""
+        dt, steps = self.flights[0].dt, max(len(f.time) for f in self.flights) - 1
+        fleet = Fleet(variants, len(of), dt, substeps(dt))
+        put(fleet, {name: np.array([start[name] for start in self.starts])[of] for name in self.starts[0]})
+        forces, errors = listed([replace(q, row=q.row - first) for q in pushes
+                                 if first <= q.row < first + len(of)], dt)  # fmt: skip
         out = np.empty((steps, len(of), len(MEASURED)))
         along(fleet.table(), self.controls, self.first[of], self.first[of + 1] - 1, self.measured,
               np.array(self.stretch)[of], self.gain, *forces, *errors, self.known, out)
-        return [lost(out[: len(f.time) - 1, at[i] : at[i + 1]], np.isfinite(f.measured[1:]))
-                for i, f in enumerate(self.flights)]
+        return out
 
     def _placed(self, i: int, series: FloatArray) -> FloatArray:
         """A series of the `i`-th record among those of all."""
         out = np.zeros(int(self.first[-1]))
         out[self.first[i] : self.first[i + 1]] = series
         return out
+
+
+def _parts(count: int) -> list[slice]:
+    """Rows in parts, one for every thread, all but the last of whole lanes."""
+    size = LANES * -(-count // (LANES * threads()))
+    return [slice(at, min(at + size, count)) for at in range(0, count, size)]

@@ -78,9 +78,10 @@ def gather(flight: Reconstruction, bank: Bank, gain: Gain | None = None) -> Evid
     base = innovations(flight, flight.parameters, gain.K, (), gain.gusts.kind)[:, 0]
     factor = whitening(base, gain, flight)
     about = Filter(as_predicted(flight, base, gain), gain, factor, round(SETTLE / flight.dt))
-    known = about.respond(pushes(about.flight, bank.terms))
-    return replace(compare(flight, parameter_rows(flight, bank), gain, factor, bank.terms, bank.linear, known),
-                   linear=about)
+    with np.errstate(over="ignore", invalid="ignore"):  # of a model that departs: see `settling.departs`
+        known = about.respond(pushes(about.flight, bank.terms))
+        found = compare(flight, parameter_rows(flight, bank), gain, factor, bank.terms, bank.linear, known)
+    return replace(found, linear=about)
 
 
 def compare(flight: Reconstruction, rows: NDArray, gain: Gain, factor: FloatArray, terms: Sequence[Term] = (),
