@@ -3,7 +3,7 @@
 Polynomials between the sizes flown, and signatures that add, hold only nearby: where an effect is large or bends (a
 rate limit, a stall), what the polynomial misses would be blamed on a second effect. Each leading set is therefore flown
 where it was fitted, with its own slopes, and fitted by Gauss-Newton; its evidence is corrected by what it gained or
-lost. Beside the best single effect, where it was flown, the whole library is then tried again.
+lost. Beside the best single effects, where they were flown, the whole library is then tried again.
 """
 
 from __future__ import annotations
@@ -183,16 +183,16 @@ class _Search:
     def companions(self) -> list[int]:
         """Pairs of the best single effects, where they were flown: with what may be forgiven them, and as they are."""
         alone = self._ranked(1)
-        as_it_is = sorted(alone, key=lambda i: -self.found[i].log_evidence)
-        return [j for i in dict.fromkeys(alone[:1] + as_it_is[:1]) for j in self._companions(i)]
+        two = sorted(alone, key=lambda i: -self.found[i].log_evidence)[:2]
+        lacking = all(len(self.points[i].held) for i in two)  # numbers went as far as they may: neither is all of it
+        return [j for i in dict.fromkeys(alone[:1] + two[: 1 + lacking]) for j in self._companions(i)]
 
     def _companions(self, i: int) -> list[int]:
         first, left = self.found[i].fit, float(self.left[i].reduced()[0, 0])
         room = any(left - u.left > TAKEN for u in self.generic[i]) or told_by_paths(self.linear, first)
-        if not room and not len(self.points[i].held):
-            return []
-        return [self.propose(together(first, fit))
-                for fit in companions(self.flying, self.linear, first, self.points[i])]
+        able = room or len(self.points[i].held)
+        others = companions(self.flying, self.linear, first, self.points[i]) if able else []
+        return [self.propose(together(first, fit)) for fit in others]
 
     def propose(self, fit: SetFit) -> int:
         """Index of a set, with sizes as proposed if it was not flown yet."""

@@ -88,6 +88,12 @@ def _regressors(effect: Effect) -> set[str]:
 
 
 @cache
+def powerless(effect: Effect) -> bool:
+    """Whether an effect changes coefficients of the airframe alone, none of them one of thrust."""
+    return all(name[:2] in (*COMPONENTS, "CD") and "CT" not in name for name in changes(effect))
+
+
+@cache
 def natural(effect: Effect, component: str, term: str) -> bool:
     """Whether a generic term may belong to another form of an effect.
 

@@ -9,7 +9,7 @@ import numpy as np
 from icing_env import effects
 from icing_env.effects import Effect
 from icing_env.record import FloatArray
-from sim2real.library.bends import bends, changes, natural, of_own, purely_own, scales, shifts
+from sim2real.library.bends import COMPONENTS, bends, changes, natural, of_own, powerless, purely_own, scales, shifts
 from sim2real.posterior.form import LEAST, SHARES, WORTH, Form, at_home
 from sim2real.posterior.generic import COURSE, UnknownFit
 from sim2real.posterior.sets import SetFit
@@ -78,6 +78,16 @@ def foreign(name: str, unknown: UnknownFit, raw: FloatArray) -> bool:
     own = {term for number in changes(effects.LIBRARY[name]) for end, terms in OF_PATH.items() if number.endswith(end)
            for term in terms}  # fmt: skip
     return bool(own) and unknown.component.endswith("_path") and _share(own, unknown, raw) < FOREIGN
+
+
+def powered(name: str, unknown: UnknownFit) -> bool:
+    """Whether the surest generic term of a force or moment goes with power, and an effect changes the airframe alone.
+
+    A propeller's torque is no form of ice on half a wing, though that explains two thirds of it.
+    """
+    surest = max(unknown.terms, key=lambda term: abs(term[1]) / term[2], default=("", 0.0, 1.0))[0]
+    airframe = unknown.component in COMPONENTS.values() and powerless(effects.LIBRARY[name])
+    return airframe and "CT" in surest.split("*")
 
 
 def _share(own: Collection[str], unknown: UnknownFit, raw: FloatArray) -> float:
