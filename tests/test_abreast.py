@@ -32,8 +32,11 @@ def records() -> list[tuple[Reconstruction, Gain]]:
     return found
 
 
+@pytest.mark.parametrize("threads", ["1", "3"])
 @pytest.mark.parametrize("counts", [(1, 1, 1), (2, 3, 1), (9, 8, 2)])
-def test_to_the_bit(records: list[tuple[Reconstruction, Gain]], counts: tuple[int, ...]) -> None:
+def test_to_the_bit(records: list[tuple[Reconstruction, Gain]], counts: tuple[int, ...], threads: str,
+                    monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
+    monkeypatch.setenv("OMP_NUM_THREADS", threads)
     flights, own = [f for f, _ in records], [g for _, g in records]
     assert [g.gusts.kind for g in own] == list(KINDS[:3])
     rows, pushes = [], []
