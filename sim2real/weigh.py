@@ -18,7 +18,7 @@ from sim2real.flown.first_guess import first_guess
 from sim2real.flown.points import Flying
 from sim2real.flown.refine import refine
 from sim2real.flown.screen import Points, screen, screened
-from sim2real.flown.settling import departs, differ, followed, gains_with, gather_about, length, nearer
+from sim2real.flown.settling import departs, differ, followed, followed_in_any, gains_with, gather_about, length, nearer
 from sim2real.flown.steps import FARTHEST, Places
 from sim2real.library.candidates import Bank
 from sim2real.over_time.varying import varying
@@ -57,11 +57,11 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
     """
     progress("fitting the model's own uncertainty")
     kind = kind_at_first(flights, baseline.kind)
-    for _ in range(2):  # once more where gusts show to be of another kind
+    moved, centre, known = followed_in_any(flights, candidates, baseline, kind)
+    guess = first_guess(moved, candidates, baseline, untestable, centre, known)
+    if known[0].gusts.kind != (kind := guess[0].gusts.kind):  # gusts show to be of another kind
         moved, centre, known = followed(flights, candidates, baseline, kind)
         guess = first_guess(moved, candidates, baseline, untestable, centre, known)
-        if kind == (kind := guess[0].gusts.kind):
-            break
     flights = moved
     found = _Weighing(flights, candidates, baseline, untestable, centre)
     progress(f"flying {candidates.size} variants along {len(flights)} records")

@@ -17,14 +17,14 @@ from sim2real.library.terms import pushes
 from sim2real.posterior.attribution import nuisance_mean, reduce, with_prior
 from sim2real.posterior.hypotheses import Hypothesis
 from sim2real.prediction.as_predicted import as_predicted
-from sim2real.prediction.gusts import LATER, Kind
+from sim2real.prediction.gusts import KINDS, LATER, Kind
 from sim2real.prediction.kalman import Gain, follow
 from sim2real.prediction.predictor import Push, innovations
 from sim2real.prediction.readings import slow
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.records.side_by_side import each
 from sim2real.signatures.evidence import Evidence, gather
-from sim2real.signatures.gust_intensity import SIGMAS, choose_gain, kind_of_gusts
+from sim2real.signatures.gust_intensity import SIGMAS, choose_gain, kind_of_gusts, likelihoods
 from sim2real.signatures.tempering import temper, total
 from sim2real.signatures.whitening import whitening
 
@@ -82,6 +82,26 @@ def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Base
         if not departs(model_alone(flights, candidates, centre, known)):
             break
     return list(flights), centre, known
+
+
+def followed_in_any(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline, kind: Kind
+                    ) -> tuple[list[Reconstruction], FloatArray, list[Gain]]:  # fmt: skip
+    """The same in gusts of `kind`, or of that in which the settled model is likeliest, where those make no sense.
+
+    In air that turns, the strongest gusts of the other kinds are the likeliest, and derivatives go as far as they may
+    with them: from there terms of a wrong explanation tell which kind turns it. Settled in each, a model says it by
+    itself; an enormous gap may pass for another kind, which is asked again with the gap (see `kind_of_gusts`).
+    """
+    found = followed(flights, candidates, baseline, kind)
+    if any(f.inadequacy.walk > 1.0 for f in flights) or max(g.sigma for g in found[2]) < SIGMAS[-1]:
+        return found
+    tried = [found, *(followed(flights, candidates, baseline, other) for other in KINDS if other != kind)]
+    return max(tried, key=lambda one: _likelihood(about(one[0], candidates, one[1]), one[2]))
+
+
+def _likelihood(flights: Sequence[Reconstruction], known: Sequence[Gain]) -> float:
+    """Sum of the records' log likelihoods of a sample with their gains."""
+    return float(np.sum(each(lambda flight, gain: likelihoods(flight, [gain])[0], flights, known)))
 
 
 def model_alone(flights: Sequence[Reconstruction], candidates: Bank, centre: FloatArray, known: Sequence[Gain]

@@ -117,8 +117,9 @@ def _in_favour(flight: Reconstruction, found: Gain, pushed: Sequence[Push]) -> l
         if (gain_of := gained(gain)) > 0.0:
             gain = choose_gain(flight, SIGMAS, pushed, kind)
             gain_of = gained(gain)
-        stay = 0.5 if kind.rotation and found.gusts.kind.rotation else 1.0  # that it turns was paid for
-        out.append(min(gain_of, 0.0) if gain.sigma == SIGMAS[-1] and kind != LATER else gain_of - stay * asked(gain))
+        # that it turns was paid for, and of one strength the kinds look stronger or weaker than they are
+        paid = 0.5 * asked(found) if kind.rotation and found.gusts.kind.rotation else asked(gain)
+        out.append(min(gain_of, 0.0) if gain.sigma == SIGMAS[-1] and kind != LATER else gain_of - paid)
     return out
 
 
