@@ -1,8 +1,11 @@
-"""A channel that comes late against what makes it is named; vanes and compasses may lag by themselves."""
+"""A channel that comes late against what makes it is named; compasses may lag by themselves, and both vanes alike."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -15,32 +18,57 @@ from testbed.withheld import files, flights, manoeuvres
 from testbed.withheld.conditions import Conditions
 
 
-@pytest.fixture(scope="module")
-def sound(tmp_path_factory) -> FlightRecord:
-    """Doublets and 3-2-1-1 in all axes at 72 m/s in light gusts."""
+@cache
+def flown(sigma: float, plan: int = 1) -> FlightRecord:
+    """Doublets and 3-2-1-1 in all axes at 72 m/s, or another plan."""
     rng = np.random.default_rng(4)
-    flown, seen = flights.recorded(flights.Aircraft(), manoeuvres.PLANS[0][1], 1.0, Conditions(0.5, 1.0, 1.0), rng)
-    path = tmp_path_factory.mktemp("sound") / "1.csv"
-    path.write_text(files.record_text(seen, flown.commands))
-    return read(path)
+    aircraft, seen = flights.recorded(flights.Aircraft(), manoeuvres.PLANS[0][plan], 1.0,
+                                      Conditions(sigma, 1.0, 1.0), rng)  # fmt: skip
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "1.csv"
+        path.write_text(files.record_text(seen, aircraft.commands))
+        return read(path)
 
 
-def late(record: FlightRecord, name: str, seconds: float) -> FlightRecord:
-    """The record with one channel shifted."""
+@pytest.fixture(scope="module")
+def sound() -> FlightRecord:
+    """In light gusts."""
+    return flown(0.5)
+
+
+def late(record: FlightRecord, seconds: float, *names: str) -> FlightRecord:
+    """The record with some channels shifted."""
     k = round(seconds / record.dt)
-    values = record[name]
-    return replace(record, channels={**record.channels, name: np.concatenate([np.full(k, values[0]), values[:-k]])})
+    moved = {name: np.concatenate([np.full(k, record[name][0]), record[name][:-k]]) for name in names}
+    return replace(record, channels={**record.channels, **moved})
 
 
-@pytest.mark.parametrize("name", ["p", "q", "r", "phi", "theta", "az", "ay"])
-def test_a_late_channel_is_refused_by_name(sound, name):
+@pytest.mark.parametrize("name", ["p", "q", "r", "phi", "theta", "az", "ay", "alpha", "beta", "elevator", "aileron",
+                                  "rudder"])  # fmt: skip
+@pytest.mark.parametrize("sigma", [0.0, 0.5, 1.5])
+def test_a_late_channel_is_refused_by_name(sigma, name):
     with pytest.raises(InputError, match=f"column '{name}' is 0.[34]. s late"):
-        check(late(sound, name, 0.4))
+        check(late(flown(sigma), 0.4, name))
 
 
-@pytest.mark.parametrize(("name", "seconds"), [("alpha", 0.2), ("beta", 0.2), ("psi", 0.4), ("q", 0.04), ("az", 0.06)])
-def test_lags_of_sound_instruments_pass(sound, name, seconds):
-    check(late(sound, name, seconds))
+@pytest.mark.parametrize(("name", "plan"), [("airspeed", 0), ("ax", 0), ("ax", 1)])
+def test_a_late_airspeed_or_axial_force_is_refused_in_still_air(name, plan):
+    with pytest.raises(InputError, match=f"column '{name}' is 0.[345]. s late"):
+        check(late(flown(0.0, plan), 0.4, name))
+
+
+@pytest.mark.parametrize(("seconds", "names"), [(0.2, ("alpha", "beta")), (0.4, ("psi",)), (0.04, ("q",)),
+                                                (0.06, ("az",)), (0.1, ("alpha",)), (0.06, ("elevator",)),
+                                                (0.06, ("ax",)), (0.1, ("airspeed",))])  # fmt: skip
+@pytest.mark.parametrize("sigma", [0.0, 0.5, 1.5])
+def test_lags_of_sound_instruments_pass(sigma, seconds, names):
+    check(late(flown(sigma), seconds, *names))
+
+
+@pytest.mark.parametrize("plan", range(len(manoeuvres.PLANS[0])))
+@pytest.mark.parametrize("sigma", [0.0, 1.5])
+def test_nothing_is_late_in_sound_records(sigma, plan):
+    check(flown(sigma, plan))
 
 
 def test_what_a_lateral_diagnosis_lacks_is_said(sound):

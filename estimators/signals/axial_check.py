@@ -31,6 +31,7 @@ LONGEST = 240  # blocks
 BIAS = 0.1  # m/s2 beforehand: 0.01 g, or 0.6 deg of attitude (assumed)
 LEVEL = 10.0  # m/s: the constant is free
 LAG = 0.2  # m/s: airspeed's error of position and lag, at least (recorded flights: 0.05 to 0.2)
+LINE = 0.05  # m/s: the same, where the lag is what is sought
 GUSTS = (0.0, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # m/s
 FACTORS = {"has its sign reversed": -1.0, "looks like g": G0, "looks like ft/s2": 0.3048}
 REVERSED, SOUND, FEET = -0.4, 0.35, 1.5  # bounds of the change of axial force with alpha, of the lift
@@ -111,10 +112,34 @@ def factor(grid: Grid) -> tuple[float, float]:
     steps = max(1, round(BLOCK / grid.dt))
     steps = max(steps, len(speed) // LONGEST)
     beside = _blocks(u - u[0] - np.cumsum(rest) * grid.dt, steps)
-    felt, t = _blocks(np.cumsum(v["ax"]) * grid.dt, steps), _blocks(grid.time - grid.time[0], steps)
     noise = (np.median(np.abs(np.diff(u, 2))) / 0.6745) ** 2 / 6.0 / steps + LAG**2
+    return _weighted(beside, _blocks(np.cumsum(v["ax"]) * grid.dt, steps), *_unknown(grid, steps, float(noise)))
+
+
+def lateness(grid: Grid) -> tuple[float, float]:
+    """By how much airspeed trails what accelerations and gravity make of it, s, and its standard error.
+
+    (0, inf) where a channel for it is missing. Summed up from the start, the rate of airspeed is airspeed but for the
+    same as in `factor`; and airspeed that is late by T lacks T times its rate.
+    """
+    names = ("airspeed", "ax", "ay", "az", "alpha", "beta", "phi", "theta")
+    if not all(name in grid.values for name in names) or not grid.good(names).all():
+        return 0.0, np.inf
+    ax, ay, az, alpha, beta, phi, theta = (grid.values[name] for name in names[1:])
+    along = (ax - G0 * np.sin(theta)) * np.cos(alpha) + (az + G0 * np.cos(theta) * np.cos(phi)) * np.sin(alpha)
+    rate = along * np.cos(beta) + (ay + G0 * np.cos(theta) * np.sin(phi)) * np.sin(beta)
+    speed = grid.values["airspeed"]
+    steps = max(1, round(BLOCK / grid.dt), len(speed) // LONGEST)
+    beside = _blocks(speed - speed[0] - np.cumsum(rate) * grid.dt, steps)
+    noise = (np.median(np.abs(np.diff(speed, 2))) / 0.6745) ** 2 / 6.0 / steps + LINE**2
+    return _weighted(beside, _blocks(-rate, steps), *_unknown(grid, steps, float(noise)))
+
+
+def _unknown(grid: Grid, steps: int, noise: float) -> tuple[FloatArray, FloatArray]:
+    """Covariance of what is not known beside a sum of accelerations in blocks but for gusts, and gusts' correlation."""
+    t = _blocks(grid.time - grid.time[0], steps)
     known = noise * np.eye(len(t)) + BIAS**2 * np.outer(t, t) + LEVEL**2
-    return _weighted(beside, felt, known, np.exp(-np.abs(t[:, None] - t[None, :]) * float(np.mean(speed)) / LENGTH))
+    return known, np.exp(-np.abs(t[:, None] - t[None, :]) * float(np.mean(grid.values["airspeed"])) / LENGTH)
 
 
 def _weighted(beside: FloatArray, felt: FloatArray, known: FloatArray, gust: FloatArray) -> tuple[float, float]:

@@ -14,13 +14,10 @@ from estimators.signals.axial_check import check_ax
 from estimators.signals.consistency import FEWEST, line
 from estimators.signals.differentiate import half_width, slope, smooth
 from estimators.signals.flow_checks import REACH, check_flow
+from estimators.signals.late_checks import check_forces, check_late, check_pair
 from estimators.signals.resample import Grid
 from icing_env.errors import InputError
 from icing_env.record import FloatArray
-
-LATE, LATEST = 0.15, 0.6  # s: gyros and attitude references of a sound record agree to less; how far is looked
-SLOW = ("psi", "alpha", "beta")  # compasses and vanes may lag by themselves
-FOLLOWS, BETTER = 0.9, 0.05  # correlation of a rate and its angle, one shifted, and by how much it must gain
 
 
 def check_kinematics(grid: Grid, where: str) -> set[str]:
@@ -45,8 +42,9 @@ def check_kinematics(grid: Grid, where: str) -> set[str]:
         reach = round(REACH / grid.dt)  # a directional gyro is coarse
         change = slope(np.unwrap(grid.values["psi"]), grid.dt, reach)
         confirmed |= _judge(where, "r", "psi", change, smooth(turn, reach), grid)
+    check_forces(where, grid, half)
+    check_late(where, grid)
     confirmed |= check_flow(where, grid, v)
-    _check_forces(where, grid, half)
     return confirmed | ({"ax"} if check_ax(where, grid) else set())
 
 
@@ -57,7 +55,7 @@ def _judge(
     rows = grid.good((angle, rate)) & np.isfinite(change) & np.isfinite(expected)
     if rows.sum() < FEWEST or max(np.std(change[rows]), np.std(expected[rows])) < 0.005:
         return set()
-    _check_late(where, rate, angle, (np.where(rows, change, 0.0), np.where(rows, expected, 0.0)), grid.dt)
+    check_pair(where, rate, angle, (np.where(rows, change, 0.0), np.where(rows, expected, 0.0)), grid.dt)
     gain, match = line(expected[rows], change[rows])
     if match < -0.7:
         raise InputError(
@@ -66,37 +64,3 @@ def _judge(
     if match > 0.7 and not 0.2 < gain < 5.0:
         raise InputError(f"{where}: '{angle}' and '{rate}' are not both in rad: {angle} changes at {gain:.3g} {rate}")
     return {rate, angle} if match > 0.7 else set()
-
-
-def _check_forces(where: str, grid: Grid, half: int) -> None:
-    """Lift and side force come with the flow angles that make them: az or ay that follow late are refused."""
-    for flow, force in (("alpha", "az"), ("beta", "ay")):
-        if not all(name in grid.values for name in (flow, force, "airspeed")):
-            continue
-        made = -smooth(grid.values[force] / grid.values["airspeed"] ** 2, half)
-        angle = smooth(grid.values[flow], half)
-        rows = grid.good((flow, force, "airspeed")) & np.isfinite(made) & np.isfinite(angle)
-        if rows.sum() >= FEWEST:
-            pair = tuple(np.where(rows, x - np.mean(x[rows]), 0.0) for x in (made, angle))
-            _check_late(where, flow, force, (pair[0], pair[1]), grid.dt)
-
-
-def _check_late(where: str, rate: str, angle: str, pair: tuple[FloatArray, FloatArray], dt: float) -> None:
-    """Refuse a rate or an angle that comes late: of the two, the later. A compass (psi) may lag; that is no fault.
-
-    `pair`: change of the angle and the rate that should make it, zero where either is not known.
-    """
-    change, expected = pair
-    reach = round(LATEST / dt)
-    if len(change) < 4 * reach:
-        return
-    inner = expected[reach:-reach]
-    shifts = np.arange(-reach, reach + 1)  # of the angle against the rate; positive: the angle is late
-    match = np.array([line(inner, change[reach + k : len(change) - reach + k])[1] for k in shifts])
-    best = int(np.argmax(match))
-    late, name, other = dt * float(shifts[best]), angle, rate
-    if late < 0.0:
-        late, name, other = -late, rate, angle
-    clear = match[best] > FOLLOWS and match[best] > abs(match[reach]) + BETTER and 0 < best < 2 * reach
-    if clear and late >= LATE and name not in SLOW:
-        raise InputError(f"{where}: column '{name}' is {late:.2f} s late against '{other}'; shift it back")
