@@ -100,8 +100,7 @@ def describe_unknown(flights: Sequence[Reconstruction], candidates: Bank, eviden
     """
     assert hypothesis.unknown is not None
     component = hypothesis.unknown.component
-    surest = max(hypothesis.unknown.terms, key=lambda term: abs(term[1]) / term[2])
-    if surest[0] not in flyable(component, flights):
+    if hypothesis.unknown.surest not in flyable(component, flights):
         return _told(component, hypothesis.unknown.terms, flights[0].reach)
     terms, at = choices(component, flights), condition(component, flights)
     only, precision = replace(candidates, families=(), terms=(), size=1 + len(candidates.nuisances)), baseline.precision

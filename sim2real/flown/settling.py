@@ -17,14 +17,14 @@ from sim2real.library.terms import pushes
 from sim2real.posterior.attribution import nuisance_mean, reduce, with_prior
 from sim2real.posterior.hypotheses import Hypothesis
 from sim2real.prediction.as_predicted import as_predicted
-from sim2real.prediction.gusts import KINDS, LATER, Kind
+from sim2real.prediction.gusts import LATER, Kind
 from sim2real.prediction.kalman import Gain, follow
 from sim2real.prediction.predictor import Push, innovations
 from sim2real.prediction.readings import slow
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.records.side_by_side import each
 from sim2real.signatures.evidence import Evidence, gather
-from sim2real.signatures.gust_intensity import SIGMAS, choose_gain, kind_of_gusts, likelihoods
+from sim2real.signatures.gust_intensity import SIGMAS, TURNING_KINDS, choose_gain, kind_of_gusts, likelihoods, turns
 from sim2real.signatures.tempering import temper, total
 from sim2real.signatures.whitening import whitening
 
@@ -86,17 +86,17 @@ def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Base
 
 def followed_in_any(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline, kind: Kind
                     ) -> tuple[list[Reconstruction], FloatArray, list[Gain]]:  # fmt: skip
-    """The same in gusts of `kind`, or of that in which the settled model is likeliest, where those make no sense.
+    """The same in gusts of `kind`, or where the air turns, in the likelier of the kinds that turn it.
 
-    In air that turns, the strongest gusts of the other kinds are the likeliest, and derivatives go as far as they may
-    with them: from there terms of a wrong explanation tell which kind turns it. Settled in each, a model says it by
-    itself; an enormous gap may pass for another kind, which is asked again with the gap (see `kind_of_gusts`).
+    Settled in gusts of another kind, several times as strong as they were, derivatives go as far as they may, and terms
+    of a wrong explanation would tell which kind turns the air; settled in each, the model says it by itself. A gap may
+    look like that, too: which kind it is is asked again with the gap (see `kind_of_gusts`).
     """
     found = followed(flights, candidates, baseline, kind)
-    if any(f.inadequacy.walk > 1.0 for f in flights) or max(g.sigma for g in found[2]) < SIGMAS[-1]:
+    if kind.rotation or not turns(about(found[0], candidates, found[1]), found[2]):
         return found
-    tried = [found, *(followed(flights, candidates, baseline, other) for other in KINDS if other != kind)]
-    return max(tried, key=lambda one: _likelihood(about(one[0], candidates, one[1]), one[2]))
+    turning = [followed(flights, candidates, baseline, other) for other in TURNING_KINDS]
+    return max([found, *turning], key=lambda one: _likelihood(about(one[0], candidates, one[1]), one[2]))
 
 
 def _likelihood(flights: Sequence[Reconstruction], known: Sequence[Gain]) -> float:

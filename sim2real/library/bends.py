@@ -65,7 +65,7 @@ def _alone(effect: Effect, kind: str) -> str:
 @cache
 def of_own(effect: Effect, component: str, term: str) -> bool:
     """Whether a generic term is natural to an effect, and made of the regressors of what it changes alone."""
-    own = _regressors(effect) if component in COMPONENTS.values() else set()
+    own = _regressors(effect, component)
     return natural(effect, component, term) and (not own or set(term.split("*")) <= own | ALWAYS)
 
 
@@ -75,22 +75,29 @@ def purely_own(effect: Effect, component: str, term: str) -> bool:
 
     Or a constant, which is what is left of any function; of an effect that changes anything else no term is.
     """
-    own = _regressors(effect) if component in COMPONENTS.values() else set()
+    own = _regressors(effect, component)
     return bool(own) and set(term.split("*")) <= {*own, "1"}
 
 
-def _regressors(effect: Effect) -> set[str]:
-    """Of the derivatives that an effect changes, where it changes nothing else but constants; else none."""
-    changed = changes(effect)
-    if not all(name[:2] in (*COMPONENTS, "CD") for name in changed):
+def _regressors(effect: Effect, component: str) -> set[str]:
+    """Of the derivatives that an effect changes, where it changes nothing else but constants; else none.
+
+    None either for a component that is no force or moment.
+    """
+    if component not in COMPONENTS.values() or not _of_coefficients(effect):
         return set()
-    return {name[3:].rstrip("2") for name in changed} - {"0"}
+    return {name[3:].rstrip("2") for name in changes(effect)} - {"0"}
 
 
 @cache
 def powerless(effect: Effect) -> bool:
     """Whether an effect changes coefficients of the airframe alone, none of them one of thrust."""
-    return all(name[:2] in (*COMPONENTS, "CD") and "CT" not in name for name in changes(effect))
+    return _of_coefficients(effect) and not any("CT" in name for name in changes(effect))
+
+
+def _of_coefficients(effect: Effect) -> bool:
+    """Whether all that an effect changes are coefficients of forces and moments."""
+    return all(name[:2] in (*COMPONENTS, "CD") for name in changes(effect))
 
 
 @cache
@@ -106,7 +113,7 @@ def natural(effect: Effect, component: str, term: str) -> bool:
         return set(term.split("*")) <= {"1", "time", channel}
     if (channel := shifts(effect)) and component == f"sensor:{channel}":
         return term in ("1", "time")
-    if component not in COMPONENTS.values() or not (own := _regressors(effect)):
+    if not (own := _regressors(effect, component)):
         return True
     own |= COMMON
     if "alphadot" in own:  # in flight hardly another thing than a rate of pitch

@@ -39,6 +39,11 @@ class UnknownFit:
         """Whitened square that it leaves, less the luck of so many terms."""
         return self.misfit + len(self.terms)
 
+    @property
+    def surest(self) -> str:
+        """Name of the term that is farthest from nothing by its standard error; empty if there is none."""
+        return max(self.terms, key=lambda term: abs(term[1]) / term[2], default=("", 0.0, 1.0))[0]
+
 
 def beside(reduced: FloatArray, fit: SetFit, slopes: list[dict[int, float]]) -> FloatArray:
     """Inner products with row 0 the residual that a set of effects leaves, its sizes free to give way.

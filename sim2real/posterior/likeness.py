@@ -85,9 +85,8 @@ def powered(name: str, unknown: UnknownFit) -> bool:
 
     A propeller's torque is no form of ice on half a wing, though that explains two thirds of it.
     """
-    surest = max(unknown.terms, key=lambda term: abs(term[1]) / term[2], default=("", 0.0, 1.0))[0]
     airframe = unknown.component in COMPONENTS.values() and powerless(effects.LIBRARY[name])
-    return airframe and "CT" in surest.split("*")
+    return airframe and "CT" in unknown.surest.split("*")
 
 
 def _share(own: Collection[str], unknown: UnknownFit, raw: FloatArray) -> float:

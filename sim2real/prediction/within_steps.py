@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from icing_env.record import FloatArray
+from icing_env.turbulence import transverse
 from sim2real.prediction.gusts import Kind
 from sim2real.prediction.predictor import TANGENT
 
-TRANSVERSE = (np.sqrt(1.5), (1.0 - np.sqrt(3.0)) / np.sqrt(2.0))  # v and w of the two states of their filters
+TRANSVERSE = (transverse(1.0, 0.0), transverse(0.0, 1.0))  # v and w of the two states of their filters
 LAG_W, LAG_V = TANGENT.index("dryden_q"), TANGENT.index("dryden_r")
 MET = ((LAG_W, "gust_w", ("dryden_w1", "dryden_w2")), (LAG_V, "gust_v", ("dryden_v1", "dryden_v2")))
 

@@ -25,6 +25,7 @@ CALM = 0.1  # m/s, below which no kind of gusts is told
 # half of what it is per (m/s)^2 (our simulator at 0.25 to 1.5 m/s: 15 to 25, and 2 to 3); m/s beyond which no more
 TURNING, AT_ONCE, MOST = (0.3, 8.0), (0.05, 1.0), 1.5
 STRAIGHT = [kind for kind in KINDS if not kind.rotation]  # LATER first
+TURNING_KINDS = [kind for kind in KINDS if kind.rotation]
 TOGETHER = 100  # samples that the channels have to share for their covariance to be judged
 
 
@@ -75,6 +76,27 @@ def _at_first(flight: Reconstruction) -> list[float]:
             return [0.0] * len(STRAIGHT)
         out.append(max(scores) - asked(best))
     return [score - out[0] for score in out]
+
+
+def turns(flights: Sequence[Reconstruction], found: Sequence[Gain]) -> bool:
+    """Whether air that turns makes a settled model likelier than the gusts `found` that do not turn it, as is asked.
+
+    Of other kinds gusts look several times as strong as they are, up to the strongest: any strength is tried. Nothing
+    is said where the model is known to follow poorly, or in calm.
+    """
+    told = [of for of in zip(flights, found, strict=True) if of[0].inadequacy.walk <= 1.0 and of[1].sigma >= CALM]
+    return bool(told) and bool(np.max(np.sum(each(_turning, *zip(*told, strict=True)), axis=0)) > 0.0)
+
+
+def _turning(flight: Reconstruction, found: Gain) -> list[float]:
+    """Log likelihood of a sample by kind that turns the air: beyond that with the gusts found, and what is asked."""
+    (here,), out = likelihoods(flight, [found]), list[float]()
+    for kind in TURNING_KINDS:
+        options = gains(flight, SIGMAS[1::2], kind)
+        scores = likelihoods(flight, options)
+        best = int(np.argmax(scores))
+        out.append(scores[best] - asked(options[best]) - here)
+    return out
 
 
 def kind_of_gusts(flights: Sequence[Reconstruction], found: Sequence[Gain], pushed: Sequence[Sequence[Push]]) -> Kind:
