@@ -8,8 +8,10 @@ import pytest
 from icing_env import scenario
 from icing_env.aircraft import load
 from icing_env.record import FlightRecord
+from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import diagnose
-from sim2real.flown.settling import likeliest_explained
+from sim2real.flown.settling import followed_in_any, likeliest_explained
+from sim2real.library.candidates import bank
 from sim2real.prediction.correction import ROTATION
 from sim2real.prediction.gusts import KINDS, LATER, Kind
 from sim2real.prediction.kalman import gains
@@ -64,6 +66,17 @@ def test_weak_gusts_that_turn_the_air_are_not_kept_for_another_such_kind(kind, t
     flight = reconstruct(flown(5, 0.35, kind))
     (gain,) = likeliest_explained([flight], [choose_gain(flight, SIGMAS, (), taken_for)], [()])
     assert gain.gusts.kind == kind
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("sigma", [0.3, 0.5])
+def test_the_model_settles_in_gusts_of_the_right_kind(sigma, kind):
+    """With a gap in it: where the air turns, 0.3 m/s pass for 1.2 to 2 of a kind that does not turn it."""
+    flights, candidates = [reconstruct(flown(4, sigma, kind, 0.8))], bank()
+    baseline = Baseline(load(), np.eye(len(candidates.nuisances)))
+    _, _, (gain,) = followed_in_any(flights, candidates, baseline, kind_at_first(flights))
+    assert gain.gusts.kind == kind
+    assert gain.sigma == pytest.approx(sigma, rel=0.3)
 
 
 def test_the_gusts_of_all_records_are_of_the_kind_that_most_of_them_say():
