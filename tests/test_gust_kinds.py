@@ -68,6 +68,14 @@ def test_weak_gusts_that_turn_the_air_are_not_kept_for_another_such_kind(kind, t
     assert gain.gusts.kind == kind
 
 
+@pytest.mark.parametrize(("seed", "sigma", "stability"), [(3, 0.5, 0.8), (8, 1.2, 1.0)])
+def test_of_kinds_that_turn_the_air_none_is_asked_for_more(seed, sigma, stability):
+    """They differ in how strong gusts look, and that they turn the air has been paid for."""
+    flight = reconstruct(flown(seed, sigma, KINDS[1], stability))
+    (gain,) = likeliest_explained([flight], [choose_gain(flight, SIGMAS, (), KINDS[3])], [()])
+    assert gain.gusts.kind == KINDS[1]
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("sigma", [0.3, 0.5])
 def test_the_model_settles_in_gusts_of_the_right_kind(sigma, kind):
