@@ -71,6 +71,14 @@ def test_nothing_is_late_in_sound_records(sigma, plan):
     check(flown(sigma, plan))
 
 
+def test_a_surface_at_rest_and_a_gap_do_not_hide_what_is_late(sound):
+    record = late(sound, 0.4, "elevator")
+    alpha = np.where((record.time > 20.0) & (record.time < 22.0), np.nan, record["alpha"])
+    spoiled = replace(record, channels={**record.channels, "rudder": np.zeros(len(alpha)), "alpha": alpha})
+    with pytest.raises(InputError, match=r"column 'elevator' is 0.4. s late against 'q'; shift it back"):
+        check(spoiled)
+
+
 def test_what_a_lateral_diagnosis_lacks_is_said(sound):
     without = replace(sound, channels={n: v for n, v in sound.channels.items() if n != "r"})
     assert [p.kind for p in reconstruct(without).record.problems if p.channel == "r"] == [

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimators.signals.axial_check import lateness
 from estimators.signals.consistency import FEWEST, line
@@ -45,6 +46,7 @@ class Relation(NamedTuple):
     left: float
 
 
+RATES, FORCE = ("p", "q", "r"), "force"
 LONGITUDINAL, LATERAL = ("alpha", "elevator", "q"), ("beta", "rudder", "r", "p")
 VANES = (Relation("az", LONGITUDINAL, "alpha", 0.95, 0.6), Relation("ay", LATERAL, "beta", 0.95, 0.6))
 OTHERS = (Relation("q", LONGITUDINAL, "elevator", 0.9, 0.5), Relation("p", (*LATERAL, "aileron"), "aileron", 0.9, 0.5),
@@ -81,38 +83,49 @@ def _late(where: str, channel: str, late: float, against: str) -> str:
 
 def _lateness(grid: Grid, relation: Relation) -> tuple[float, bool]:
     """By how much the channel of a relation is late, s (infinite where it is not told), and whether that is clear."""
-    names = {"airspeed", relation.force, *relation.beside}
-    if not all(name in grid.values for name in names):
-        return np.inf, False
-    half, reach = half_width(grid.dt), round(LATEST / grid.dt)
-    smoothed = {name: smooth(grid.values[name], half) for name in names}
-    pressure = smoothed["airspeed"] ** 2
-    made = smoothed[relation.force] if relation.force[0] == "a" else slope(grid.values[relation.force], grid.dt, half)
-    columns = {name: smoothed[name] for name in relation.beside}
-    if relation.force == "ax":
-        columns |= {"curve": columns["alpha"] ** 2, "thrust": 1.0 / pressure}
-    columns["force"] = made / pressure
-    moved = relation.channel if relation.channel in columns else "force"
-    known = grid.good(names) & np.all(np.isfinite(list(columns.values())), axis=0)
+    columns, known = _columns(grid, relation)
+    reach, step = round(LATEST / grid.dt), max(1, round(SHIFT / grid.dt))
+    shifts = np.arange(-reach, reach + 1, step)
     rows = np.arange(reach, len(known) - reach, max(1, round(STEP / grid.dt)))
-    shifts = np.arange(-reach, reach + 1, max(1, round(SHIFT / grid.dt)))
-    rows = rows[known[rows[:, None] + shifts[[0, len(shifts) // 2, -1]]].all(axis=1)]
-    if len(rows) < FEWEST * len(columns):
+    rows = rows[known[rows[:, None] + shifts].all(axis=1)]
+    if len(rows) < FEWEST * max(len(columns), 1):
         return np.inf, False
-    still = np.column_stack([x[rows] for name, x in columns.items() if name not in (moved, "force")])
-    unexplained = np.array([_unexplained(still, {n: columns[n][rows + k * (n == moved)] for n in (moved, "force")})
-                            for k in shifts])  # fmt: skip
-    best, now = int(np.argmin(unexplained)), unexplained[len(shifts) // 2]
+    force = columns.pop(FORCE)
+    moved = columns.pop(relation.channel, None)
+    beside = np.column_stack([*(x[rows] for x in columns.values()), np.ones(len(rows))])
+    unexplained = np.array([
+        _unexplained(force[rows + k], beside) if moved is None else
+        _unexplained(force[rows], np.column_stack([beside, moved[rows + k]])) for k in shifts
+    ])  # fmt: skip
+    best = int(np.argmin(unexplained))
     if unexplained[best] > 1.0 - relation.follows**2 or best in (0, len(shifts) - 1):
         return np.inf, False
+    now = unexplained[int(np.argmin(np.abs(shifts)))]
     return float(shifts[best]) * grid.dt, bool(unexplained[best] < relation.left * now)
 
 
-def _unexplained(still: FloatArray, moving: dict[str, FloatArray]) -> float:
-    """Share of the variance of `force` (N,) that columns (N, n), the other moving one and a constant do not explain."""
-    force = moving["force"]
-    columns = np.column_stack([still, *(x for name, x in moving.items() if name != "force"), np.ones(len(force))])
-    scaled = columns / np.linalg.norm(columns, axis=0)
+def _columns(grid: Grid, relation: Relation) -> tuple[dict[str, FloatArray], NDArray[np.bool_]]:
+    """What is fitted (FORCE) and what it is fitted with, each (N,), and where all of it is known (N,).
+
+    Nothing where a channel is missing.
+    """
+    names = {"airspeed", relation.force, *relation.beside}
+    if not all(name in grid.values for name in names):
+        return {}, np.zeros(len(grid.time), dtype=bool)
+    half = half_width(grid.dt)
+    columns = {name: smooth(grid.values[name], half) for name in relation.beside}
+    pressure, force = smooth(grid.values["airspeed"], half) ** 2, grid.values[relation.force]
+    if relation.force == "ax":  # drag with the square of lift, and thrust
+        columns |= {"square": columns["alpha"] ** 2, "thrust": 1.0 / pressure}
+    made = slope(force, grid.dt, half) if relation.force in RATES else smooth(force, half)
+    columns[FORCE] = made / pressure
+    return columns, grid.good(names) & np.all(np.isfinite(list(columns.values())), axis=0)
+
+
+def _unexplained(force: FloatArray, columns: FloatArray) -> float:
+    """Share of the variance of a force (N,) that columns (N, n), a constant among them, do not explain."""
+    size = np.linalg.norm(columns, axis=0)
+    scaled = columns / np.where(size > 0.0, size, 1.0)  # a rudder may rest at zero
     left = force - scaled @ np.linalg.lstsq(scaled, force, rcond=None)[0]
     total = float(np.sum((force - force.mean()) ** 2))
     return float(left @ left) / total if total > 0.0 else 1.0
