@@ -89,14 +89,17 @@ def followed_in_any(flights: Sequence[Reconstruction], candidates: Bank, baselin
     """The same in gusts of `kind`, or where the air turns, in the likelier of the kinds that turn it.
 
     Settled in gusts of another kind, several times as strong as they were, derivatives go as far as they may, and terms
-    of a wrong explanation would tell which kind turns the air; settled in each, the model says it by itself. A gap may
-    look like that, too: which kind it is is asked again with the gap (see `kind_of_gusts`).
+    of a wrong explanation would tell which kind turns the air; settled in each, the model says it by itself. A gap in
+    roll or yaw may look like that, too: where numbers of these moments go as far as they may in air that turns, the
+    kind is asked with the gap alone (see `kind_of_gusts`).
     """
     found = followed(flights, candidates, baseline, kind)
     if kind.rotation or not turns(about(found[0], candidates, found[1]), found[2]):
         return found
     turning = [followed(flights, candidates, baseline, other) for other in TURNING_KINDS]
-    return max([found, *turning], key=lambda one: _likelihood(about(one[0], candidates, one[1]), one[2]))
+    likely = max([found, *turning], key=lambda one: _likelihood(about(one[0], candidates, one[1]), one[2]))
+    rolls = [nuisance.name.startswith(("Cl_", "Cn_")) for nuisance in candidates.nuisances]
+    return likely if np.max(np.abs(likely[1][rolls])) < MOVED else found
 
 
 def _likelihood(flights: Sequence[Reconstruction], known: Sequence[Gain]) -> float:
