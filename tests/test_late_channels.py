@@ -67,8 +67,11 @@ def test_lags_of_sound_instruments_pass(sigma, seconds, names):
 
 @pytest.mark.parametrize("plan", range(len(manoeuvres.PLANS[0])))
 @pytest.mark.parametrize("sigma", [0.0, 1.5])
-def test_nothing_is_late_in_sound_records(sigma, plan):
-    check(flown(sigma, plan))
+def test_nothing_is_late_in_sound_records_and_parts_of_them(sigma, plan):
+    """In a part where an axis hardly moves, some shift is always the best."""
+    record = flown(sigma, plan)
+    for first, last in ((0.0, 60.0), (0.0, 20.0), (10.0, 30.0), (20.0, 60.0)):
+        check(record.take((record.time >= first) & (record.time < last)))
 
 
 def test_a_surface_at_rest_and_a_gap_do_not_hide_what_is_late(sound):
