@@ -79,7 +79,7 @@ def test_of_kinds_that_turn_the_air_none_is_asked_for_more(seed, sigma, stabilit
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("sigma", [0.3, 0.5])
 def test_the_model_settles_in_gusts_of_the_right_kind(sigma, kind):
-    """With a gap in it: where the air turns, 0.3 m/s pass for 1.2 to 2 of a kind that does not turn it."""
+    """With a gap in it, air that turns passes for gusts that do not turn it, some of them several times as strong."""
     flights, candidates = [reconstruct(flown(4, sigma, kind, 0.8))], bank()
     baseline = Baseline(load(), np.eye(len(candidates.nuisances)))
     _, _, (gain,) = followed_in_any(flights, candidates, baseline, kind_at_first(flights))
