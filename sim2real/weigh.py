@@ -14,7 +14,7 @@ from sim2real.baseline.quasi_steady import LOSES
 from sim2real.baseline.references import Baseline
 from sim2real.baseline.spread import likeliest, of_spread, spread_beside
 from sim2real.flown.companions import leading
-from sim2real.flown.first_guess import first_guess
+from sim2real.flown.first_guess import first_guess, likeliest_guess
 from sim2real.flown.points import Flying
 from sim2real.flown.refine import refine
 from sim2real.flown.screen import Points, screen, screened
@@ -57,15 +57,13 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
     """
     progress("fitting the model's own uncertainty")
     kind = kind_at_first(flights, baseline.kind)
-    moved, centre, known = followed_in_any(flights, candidates, baseline, kind)
-    guess = first_guess(moved, candidates, baseline, untestable, centre, known)
-    if known[0].gusts.kind != (kind := guess[0].gusts.kind):  # gusts show to be of another kind
-        moved, centre, known = followed(flights, candidates, baseline, kind)
-        guess = first_guess(moved, candidates, baseline, untestable, centre, known)
-    flights = moved
+    guess = likeliest_guess(followed_in_any(flights, candidates, baseline, kind), candidates, baseline, untestable)
+    if guess.settled.known[0].gusts.kind != (kind := guess.kind):  # gusts show to be of another kind
+        guess = first_guess(followed(flights, candidates, baseline, kind), candidates, baseline, untestable)
+    flights, centre, _ = guess.settled
     found = _Weighing(flights, candidates, baseline, untestable, centre)
     progress(f"flying {candidates.size} variants along {len(flights)} records")
-    found.gather(guess)
+    found.gather(guess.gains)
     found.explain(progress)
     found.judge_spread(progress)
     untestable |= found.quiet

@@ -10,6 +10,7 @@ from icing_env.aircraft import load
 from icing_env.record import FlightRecord
 from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import diagnose
+from sim2real.flown.first_guess import likeliest_guess
 from sim2real.flown.settling import followed_in_any, likeliest_explained
 from sim2real.library.candidates import bank
 from sim2real.prediction.correction import ROTATION
@@ -22,10 +23,14 @@ from testbed.flight import fly
 
 
 @cache
-def flown(seed: int, sigma: float, kind: Kind = LATER, stability: float = 1.0) -> FlightRecord:
-    """`stability`: share of the published Cm_alpha that the aircraft has."""
+def flown(seed: int, sigma: float, kind: Kind = LATER, stability: float = 1.0, trim: float = 0.0, roll: float = 0.0,
+          elevator: float = 1.0) -> FlightRecord:  # fmt: skip
+    """`stability`, `elevator`: shares of the published Cm_alpha, Cm_elevator that the aircraft has; Cm_0, Cl_0 beside.
+    """
     weather = {"turbulence_sigma_w": sigma, "turbulence_tail_delay": float(kind.tail_delay),
-               "turbulence_rotation": float(kind.rotation), "Cm_alpha": stability * float(load()["Cm_alpha"][0])}
+               "turbulence_rotation": float(kind.rotation), "Cm_alpha": stability * float(load()["Cm_alpha"][0]),
+               "Cm_elevator": elevator * float(load()["Cm_elevator"][0]), "Cm_0": trim + float(load()["Cm_0"][0]),
+               "Cl_0": roll + float(load()["Cl_0"][0])}
     chosen = scenario.load("clear_air", duration=52.0, parameters=weather)
     return fly(chosen, seed=seed, observer=False, protection=False).record
 
@@ -82,9 +87,23 @@ def test_the_model_settles_in_gusts_of_the_right_kind(sigma, kind):
     """With a gap in it, air that turns passes for gusts that do not turn it, some of them several times as strong."""
     flights, candidates = [reconstruct(flown(4, sigma, kind, 0.8))], bank()
     baseline = Baseline(load(), np.eye(len(candidates.nuisances)))
-    _, _, (gain,) = followed_in_any(flights, candidates, baseline, kind_at_first(flights))
+    (way,) = followed_in_any(flights, candidates, baseline, kind_at_first(flights))
+    (gain,) = way.known
     assert gain.gusts.kind == kind
     assert gain.sigma == pytest.approx(sigma, rel=0.3)
+
+
+@pytest.mark.parametrize(("seed", "kind", "gap"), [
+    (11, KINDS[1], {"trim": 0.06}), (13, KINDS[3], {"trim": 0.06}), (12, KINDS[2], {"stability": 0.5}),
+    (4, KINDS[2], {"elevator": 0.6}), (4, LATER, {"trim": 0.06}), (13, LATER, {"roll": 0.006}),
+])
+def test_of_a_gap_that_no_gusts_make_sense_of_a_first_guess_tells_their_kind(seed, kind, gap):
+    """Settled without it, the model is told to meet 3.2 m/s, or derivatives go as far as they may in air that turns."""
+    flights, candidates = [reconstruct(flown(seed, 1.5, kind, **gap))], bank()
+    baseline = Baseline(load(), np.eye(len(candidates.nuisances)))
+    ways = followed_in_any(flights, candidates, baseline, kind_at_first(flights))
+    assert len(ways) == 2
+    assert likeliest_guess(ways, candidates, baseline, ()).kind == kind
 
 
 def test_the_gusts_of_all_records_are_of_the_kind_that_most_of_them_say():

@@ -1,4 +1,4 @@
-"""Sign and unit of the axial acceleration, from airspeed and gravity, and from the lift that alpha tilts forward.
+"""The axial acceleration against airspeed, gravity and the lift that alpha tilts forward: sign, unit, lateness.
 
 u' = r v - q w - g sin(theta) + k ax (Klein & Morelli, Aircraft System Identification, AIAA 2006, section 3.3). Summed
 up from the start, airspeed less the other terms is k times the sum of ax, beside: a constant, a slope (biases of
@@ -109,11 +109,7 @@ def factor(grid: Grid) -> tuple[float, float]:
     if float(np.std(turning)) > BIAS:
         return 1.0, np.inf
     rest = turning - v.get("q", zero) * w - G0 * np.sin(v["theta"])
-    steps = max(1, round(BLOCK / grid.dt))
-    steps = max(steps, len(speed) // LONGEST)
-    beside = _blocks(u - u[0] - np.cumsum(rest) * grid.dt, steps)
-    noise = (np.median(np.abs(np.diff(u, 2))) / 0.6745) ** 2 / 6.0 / steps + LAG**2
-    return _weighted(beside, _blocks(np.cumsum(v["ax"]) * grid.dt, steps), *_unknown(grid, steps, float(noise)))
+    return _summed(grid, u, rest, np.cumsum(v["ax"]) * grid.dt, LAG)
 
 
 def lateness(grid: Grid) -> tuple[float, float]:
@@ -128,11 +124,19 @@ def lateness(grid: Grid) -> tuple[float, float]:
     ax, ay, az, alpha, beta, phi, theta = (grid.values[name] for name in names[1:])
     along = (ax - G0 * np.sin(theta)) * np.cos(alpha) + (az + G0 * np.cos(theta) * np.cos(phi)) * np.sin(alpha)
     rate = along * np.cos(beta) + (ay + G0 * np.cos(theta) * np.sin(phi)) * np.sin(beta)
-    speed = grid.values["airspeed"]
+    return _summed(grid, grid.values["airspeed"], rate, -rate, LINE)
+
+
+def _summed(grid: Grid, speed: FloatArray, rate: FloatArray, felt: FloatArray, least: float) -> tuple[float, float]:
+    """The factor of `felt` that a speed has beside the sum of a rate, each (N,), and its standard error.
+
+    Args:
+        least: of the speed's own error, m/s.
+    """
     steps = max(1, round(BLOCK / grid.dt), len(speed) // LONGEST)
+    noise = (np.median(np.abs(np.diff(speed, 2))) / 0.6745) ** 2 / 6.0 / steps + least**2
     beside = _blocks(speed - speed[0] - np.cumsum(rate) * grid.dt, steps)
-    noise = (np.median(np.abs(np.diff(speed, 2))) / 0.6745) ** 2 / 6.0 / steps + LINE**2
-    return _weighted(beside, _blocks(-rate, steps), *_unknown(grid, steps, float(noise)))
+    return _weighted(beside, _blocks(felt, steps), *_unknown(grid, steps, float(noise)))
 
 
 def _unknown(grid: Grid, steps: int, noise: float) -> tuple[FloatArray, FloatArray]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +25,15 @@ from sim2real.prediction.readings import slow
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.records.side_by_side import each
 from sim2real.signatures.evidence import Evidence, gather
-from sim2real.signatures.gust_intensity import SIGMAS, TURNING_KINDS, choose_gain, kind_of_gusts, likelihoods, turns
+from sim2real.signatures.gust_intensity import (
+    SIGMAS,
+    STRAIGHT,
+    TURNING_KINDS,
+    choose_gain,
+    kind_of_gusts,
+    likelihoods,
+    turns,
+)
 from sim2real.signatures.tempering import temper, total
 from sim2real.signatures.whitening import whitening
 
@@ -69,9 +78,20 @@ def _at_first(flight: Reconstruction, kind: Kind) -> Gain:
     return follow(flight, found) if slow(flight) else found.with_start()
 
 
-def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline,
-             kind: Kind = LATER) -> tuple[list[Reconstruction], FloatArray, list[Gain]]:
-    """The records, with the settled model's nuisances [n] and gains; arguments as in `settle`.
+class Settled(NamedTuple):
+    """Records, and where the model settles that has no gap: its nuisances [n], and the gains of each record."""
+
+    flights: list[Reconstruction]
+    centre: FloatArray
+    known: list[Gain]
+
+    def likelihood(self, candidates: Bank) -> float:
+        """Sum of the records' log likelihoods of a sample."""
+        return likelihood(about(self.flights, candidates, self.centre), self.known)
+
+
+def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline, kind: Kind = LATER) -> Settled:
+    """The records, with the settled model's nuisances and gains; arguments as in `settle`.
 
     A model that is no longer corrected enough to keep to a record departs from it, and nothing can be told of what
     departs. Its filter has to expect more noise, though some of a gap may pass for that.
@@ -81,28 +101,30 @@ def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Base
         centre, known = settle(flights, candidates, baseline, kind)
         if not departs(model_alone(flights, candidates, centre, known)):
             break
-    return list(flights), centre, known
+    return Settled(list(flights), centre, known)
 
 
 def followed_in_any(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline, kind: Kind
-                    ) -> tuple[list[Reconstruction], FloatArray, list[Gain]]:  # fmt: skip
+                    ) -> list[Settled]:  # fmt: skip
     """The same in gusts of `kind`, or where the air turns, in the likelier of the kinds that turn it.
 
-    Settled in gusts of another kind, several times as strong as they were, derivatives go as far as they may, and terms
-    of a wrong explanation would tell which kind turns the air; settled in each, the model says it by itself. A gap in
-    roll or yaw may look like that, too: where numbers of these moments go as far as they may in air that turns, the
-    kind is asked with the gap alone (see `kind_of_gusts`).
+    Settled in gusts of another kind, often several times as strong as they were, derivatives go as far as they may, and
+    terms of a wrong explanation would tell which kind turns the air; settled in each, the model says it by itself. A
+    gap may look like that, too. In both is settled what a first guess has to decide: where numbers of rolling or yawing
+    moments go as far as they may in air that turns, and where only the strongest gusts make sense, in which the tail
+    meets them later or not.
     """
     found = followed(flights, candidates, baseline, kind)
-    if kind.rotation or not turns(about(found[0], candidates, found[1]), found[2]):
-        return found
-    turning = [followed(flights, candidates, baseline, other) for other in TURNING_KINDS]
-    likely = max([found, *turning], key=lambda one: _likelihood(about(one[0], candidates, one[1]), one[2]))
-    rolls = [nuisance.name.startswith(("Cl_", "Cn_")) for nuisance in candidates.nuisances]
-    return likely if np.max(np.abs(likely[1][rolls])) < MOVED else found
+    if not kind.rotation and turns(about(found.flights, candidates, found.centre), found.known):
+        turning = [followed(flights, candidates, baseline, other) for other in TURNING_KINDS]
+        likely = max([found, *turning], key=lambda one: one.likelihood(candidates))
+        rolls = [nuisance.name.startswith(("Cl_", "Cn_")) for nuisance in candidates.nuisances]
+        return [likely] if np.max(np.abs(likely.centre[rolls])) < MOVED else [found, likely]
+    others = STRAIGHT if min(gain.sigma for gain in found.known) >= SIGMAS[-1] else ()
+    return [found, *(followed(flights, candidates, baseline, other) for other in others if other != kind)]
 
 
-def _likelihood(flights: Sequence[Reconstruction], known: Sequence[Gain]) -> float:
+def likelihood(flights: Sequence[Reconstruction], known: Sequence[Gain]) -> float:
     """Sum of the records' log likelihoods of a sample with their gains."""
     return float(np.sum(each(lambda flight, gain: likelihoods(flight, [gain])[0], flights, known)))
 
@@ -174,7 +196,7 @@ def gains_with(flying: Flying, best: Hypothesis, nuisances: FloatArray, turns: i
     """
     candidates = flying.candidates
     for turn in range(turns):
-        moved = [_with(f, candidates, best, nuisances) for f in flying.flights]
+        moved = [explained(f, candidates, best, nuisances) for f in flying.flights]
         pushed = [_pushed(e, f, candidates, best.pushed) for e, f in zip(flying.evidences, moved, strict=True)]
         known = likeliest_explained(moved, [e.gain for e in flying.evidences], pushed)
         if best.pushed or not best.effects or not differ(known, flying.evidences) or turn == turns - 1:
@@ -190,7 +212,7 @@ def differ(known: Sequence[Gain], evidences: Sequence[Evidence]) -> bool:
     return max(unlike(g, e.gain) for g, e in zip(known, evidences, strict=True)) > UNLIKE
 
 
-def _with(flight: Reconstruction, candidates: Bank, best: Hypothesis, nuisances: FloatArray) -> Reconstruction:
+def explained(flight: Reconstruction, candidates: Bank, best: Hypothesis, nuisances: FloatArray) -> Reconstruction:
     """A record about the model with the known effects of an explanation in it."""
     row = shifted(flight.parameters, candidates.nuisances, nuisances, flight.power_from)
     return replace(flight, parameters=effects.with_effects(row, best.fit.values) if best.effects else row)

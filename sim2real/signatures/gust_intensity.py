@@ -69,19 +69,25 @@ def _at_first(flight: Reconstruction) -> list[float]:
     """
     out = list[float]()
     for kind in STRAIGHT:
-        options = gains(flight, SIGMAS[1::2], kind)
-        scores = likelihoods(flight, options)
-        best = options[int(np.argmax(scores))]
-        if kind == LATER and best.sigma < CALM:
+        likely, score = _of_any_strength(flight, kind)
+        if kind == LATER and likely.sigma < CALM:
             return [0.0] * len(STRAIGHT)
-        out.append(max(scores) - asked(best))
+        out.append(score - asked(likely))
     return [score - out[0] for score in out]
+
+
+def _of_any_strength(flight: Reconstruction, kind: Kind) -> tuple[Gain, float]:
+    """The likeliest gusts of a kind with the model alone, to a step or two of SIGMAS, and their log likelihood."""
+    options = gains(flight, SIGMAS[1::2], kind)
+    scores = likelihoods(flight, options)
+    best = int(np.argmax(scores))
+    return options[best], scores[best]
 
 
 def turns(flights: Sequence[Reconstruction], found: Sequence[Gain]) -> bool:
     """Whether air that turns makes a settled model likelier than the gusts `found` that do not turn it, as is asked.
 
-    Of other kinds gusts look several times as strong as they are, up to the strongest: any strength is tried. Nothing
+    Of other kinds gusts often look several times as strong as they are, up to the strongest: any is tried. Nothing
     is said where the model is known to follow poorly, or in calm.
     """
     told = [of for of in zip(flights, found, strict=True) if of[0].inadequacy.walk <= 1.0 and of[1].sigma >= CALM]
@@ -90,13 +96,9 @@ def turns(flights: Sequence[Reconstruction], found: Sequence[Gain]) -> bool:
 
 def _turning(flight: Reconstruction, found: Gain) -> list[float]:
     """Log likelihood of a sample by kind that turns the air: beyond that with the gusts found, and what is asked."""
-    (here,), out = likelihoods(flight, [found]), list[float]()
-    for kind in TURNING_KINDS:
-        options = gains(flight, SIGMAS[1::2], kind)
-        scores = likelihoods(flight, options)
-        best = int(np.argmax(scores))
-        out.append(scores[best] - asked(options[best]) - here)
-    return out
+    (here,) = likelihoods(flight, [found])
+    likely = [_of_any_strength(flight, kind) for kind in TURNING_KINDS]
+    return [score - asked(gain) - here for gain, score in likely]
 
 
 def kind_of_gusts(flights: Sequence[Reconstruction], found: Sequence[Gain], pushed: Sequence[Sequence[Push]]) -> Kind:
