@@ -19,7 +19,7 @@ from sim2real.posterior.singles import fit_family
 from sim2real.prediction.gusts import Kind
 from sim2real.prediction.kalman import Gain
 from sim2real.signatures.courses import Course, Courses
-from sim2real.signatures.gust_intensity import TURNING, asked
+from sim2real.signatures.gust_intensity import SIGMAS, TURNING, asked
 from sim2real.signatures.tempering import temper, total
 
 PLAIN, GUESSES = 20.0, 4  # log evidence by which an effect is plain to see, and how many of these are flown
@@ -43,14 +43,16 @@ def likeliest_guess(ways: Sequence[Settled], candidates: Bank, baseline: Baselin
 
     What a gap makes of a model that has none passes for a kind of gusts; with the gap in it, the likelihood tells. It
     has to gain a little by gusts of another kind than those of the first guess, by air that turns what is asked of it:
-    that passes for what another form of a gap in roll leaves, too.
+    that passes for what another form of a gap in roll leaves, too. Where only the strongest make sense even so, what is
+    not understood passes for gusts, and nothing is in favour of another kind.
     """
     best, *others = [first_guess(way, candidates, baseline, untestable) for way in ways]
     for other in others:
         needed = 0.0 if other.kind == best.kind else TURNING[0] * len(other.gains)
         if other.kind.rotation and not best.kind.rotation:
             needed = sum(asked(gain) for gain in other.gains)
-        if other.likelihood > best.likelihood + needed:
+        sense = other.kind == best.kind or min(gain.sigma for gain in other.gains) < SIGMAS[-1]
+        if sense and other.likelihood > best.likelihood + needed:
             best = other
     return best
 

@@ -112,15 +112,17 @@ def followed_in_any(flights: Sequence[Reconstruction], candidates: Bank, baselin
     terms of a wrong explanation would tell which kind turns the air; settled in each, the model says it by itself. A
     gap may look like that, too. In both is settled what a first guess has to decide: where numbers of rolling or yawing
     moments go as far as they may in air that turns, and where only the strongest gusts make sense, in which the tail
-    meets them later or not.
+    meets them later or not. The latter is not asked of an aircraft that the model follows poorly.
     """
     found = followed(flights, candidates, baseline, kind)
     if not kind.rotation and turns(about(found.flights, candidates, found.centre), found.known):
         turning = [followed(flights, candidates, baseline, other) for other in TURNING_KINDS]
         likely = max([found, *turning], key=lambda one: one.likelihood(candidates))
         rolls = [nuisance.name.startswith(("Cl_", "Cn_")) for nuisance in candidates.nuisances]
-        return [likely] if np.max(np.abs(likely.centre[rolls])) < MOVED else [found, likely]
-    others = STRAIGHT if min(gain.sigma for gain in found.known) >= SIGMAS[-1] else ()
+        believed = likely is found or np.max(np.abs(likely.centre[rolls])) < MOVED
+        return [likely] if believed else [found, likely]
+    told = all(flight.inadequacy.walk <= 1.0 for flight in found.flights)
+    others = STRAIGHT if told and min(gain.sigma for gain in found.known) >= SIGMAS[-1] else ()
     return [found, *(followed(flights, candidates, baseline, other) for other in others if other != kind)]
 
 
