@@ -25,8 +25,7 @@ from testbed.flight import fly
 @cache
 def flown(seed: int, sigma: float, kind: Kind = LATER, stability: float = 1.0, trim: float = 0.0, roll: float = 0.0,
           elevator: float = 1.0) -> FlightRecord:  # fmt: skip
-    """`stability`, `elevator`: shares of the published Cm_alpha, Cm_elevator that the aircraft has; Cm_0, Cl_0 beside.
-    """
+    """`stability`, `elevator`: shares of the published Cm_alpha, Cm_elevator; `trim`, `roll`: added to Cm_0, Cl_0."""
     weather = {"turbulence_sigma_w": sigma, "turbulence_tail_delay": float(kind.tail_delay),
                "turbulence_rotation": float(kind.rotation), "Cm_alpha": stability * float(load()["Cm_alpha"][0]),
                "Cm_elevator": elevator * float(load()["Cm_elevator"][0]), "Cm_0": trim + float(load()["Cm_0"][0]),
