@@ -1,5 +1,6 @@
 """Kinds of gusts: each is told from the others, and none of them is blamed on the aircraft."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,8 +11,9 @@ from icing_env.aircraft import load
 from icing_env.record import FlightRecord
 from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import diagnose
-from sim2real.flown.first_guess import likeliest_guess
-from sim2real.flown.settling import followed_in_any, likeliest_explained
+from sim2real.flown import first_guess
+from sim2real.flown.first_guess import Guess, likeliest_guess
+from sim2real.flown.settling import Settled, followed_in_any, likeliest_explained
 from sim2real.library.candidates import bank
 from sim2real.prediction.correction import ROTATION
 from sim2real.prediction.gusts import KINDS, LATER, Kind
@@ -103,6 +105,27 @@ def test_of_a_gap_that_no_gusts_make_sense_of_a_first_guess_tells_their_kind(see
     ways = followed_in_any(flights, candidates, baseline, kind_at_first(flights))
     assert len(ways) == 2
     assert likeliest_guess(ways, candidates, baseline, ()).kind == kind
+
+
+@pytest.mark.parametrize(("kind", "sigma", "ahead", "taken"), [
+    (KINDS[2], 1.5, 0.2, False), (KINDS[2], 1.5, 0.4, True), (KINDS[2], SIGMAS[-1], 9.0, False),
+    (KINDS[1], 1.5, 9.0, False), (KINDS[1], 1.5, 19.0, True), (LATER, SIGMAS[-1], 0.1, True),
+])
+def test_what_a_guess_in_other_gusts_has_to_gain(monkeypatch, kind, sigma, ahead, taken):
+    """Air that turns all that is asked of it; where only the strongest gusts make sense even so, none is enough."""
+    flight = reconstruct(flown(5, 0.5))
+    first, second = (Settled([flight], np.zeros(1), gains(flight, (s,), k)) for s, k in ((1.5, LATER), (sigma, kind)))
+    found = {id(first): Guess(first, first.known, 50.0), id(second): Guess(second, second.known, 50.0 + ahead)}
+    monkeypatch.setattr(first_guess, "first_guess", lambda way, *_: found[id(way)])
+    guess = first_guess.likeliest_guess([first, second], bank(), Baseline(load(), np.eye(1)), ())
+    assert (guess.settled is second) == taken
+
+
+def test_of_an_aircraft_that_the_model_follows_poorly_no_kind_of_gusts_is_asked():
+    flight, candidates = reconstruct(flown(12, 1.5, KINDS[2], stability=0.5)), bank()
+    poorly = replace(flight, inadequacy=flight.inadequacy.with_walk(3.0))
+    baseline = Baseline(load(), np.eye(len(candidates.nuisances)))
+    assert len(followed_in_any([poorly], candidates, baseline, LATER)) == 1
 
 
 def test_the_gusts_of_all_records_are_of_the_kind_that_most_of_them_say():
