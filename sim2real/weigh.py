@@ -58,9 +58,9 @@ def fit(flights: Sequence[Reconstruction], candidates: Bank, untestable: dict[st
     progress("fitting the model's own uncertainty")
     kind = kind_at_first(flights, baseline.kind)
     guess = likeliest_guess(followed_in_any(flights, candidates, baseline, kind), candidates, baseline, untestable)
-    if guess.settled.known[0].gusts.kind != (kind := guess.kind):  # gusts show to be of another kind
-        guess = first_guess(followed(flights, candidates, baseline, kind), candidates, baseline, untestable)
-    flights, centre, _ = guess.settled
+    if guess.kind != guess.begun.kind:  # gusts show to be of another kind
+        guess = first_guess(followed(flights, candidates, baseline, guess.kind), candidates, baseline, untestable)
+    flights, centre, _ = guess.begun
     found = _Weighing(flights, candidates, baseline, untestable, centre)
     progress(f"flying {candidates.size} variants along {len(flights)} records")
     found.gather(guess.gains)

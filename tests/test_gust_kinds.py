@@ -13,7 +13,7 @@ from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import diagnose
 from sim2real.flown import first_guess
 from sim2real.flown.first_guess import Guess, likeliest_guess
-from sim2real.flown.settling import Settled, followed_in_any, likeliest_explained
+from sim2real.flown.settling import Followed, followed_in_any, likeliest_explained
 from sim2real.library.candidates import bank
 from sim2real.prediction.correction import ROTATION
 from sim2real.prediction.gusts import KINDS, LATER, Kind
@@ -114,11 +114,12 @@ def test_of_a_gap_that_no_gusts_make_sense_of_a_first_guess_tells_their_kind(see
 def test_what_a_guess_in_other_gusts_has_to_gain(monkeypatch, kind, sigma, ahead, taken):
     """Air that turns all that is asked of it; where only the strongest gusts make sense even so, none is enough."""
     flight = reconstruct(flown(5, 0.5))
-    first, second = (Settled([flight], np.zeros(1), gains(flight, (s,), k)) for s, k in ((1.5, LATER), (sigma, kind)))
-    found = {id(first): Guess(first, first.known, 50.0), id(second): Guess(second, second.known, 50.0 + ahead)}
-    monkeypatch.setattr(first_guess, "first_guess", lambda way, *_: found[id(way)])
+    first, second = (Followed([flight], np.zeros(1), gains(flight, (s,), k)) for s, k in ((1.5, LATER), (sigma, kind)))
+    likely = {id(first.known): 50.0, id(second.known): 50.0 + ahead}
+    monkeypatch.setattr(first_guess, "likelihood", lambda _, known: likely[id(known)])
+    monkeypatch.setattr(first_guess, "first_guess", lambda way, *_: Guess(way, way.flights, way.known))
     guess = first_guess.likeliest_guess([first, second], bank(), Baseline(load(), np.eye(1)), ())
-    assert (guess.settled is second) == taken
+    assert (guess.begun is second) == taken
 
 
 def test_of_an_aircraft_that_the_model_follows_poorly_no_kind_of_gusts_is_asked():

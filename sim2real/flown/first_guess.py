@@ -10,7 +10,16 @@ import numpy as np
 
 from sim2real.baseline.references import Baseline
 from sim2real.flown.points import Flying
-from sim2real.flown.settling import Settled, departs, explained, gains_with, gather_about, likelihood, model_alone
+from sim2real.flown.settling import (
+    Followed,
+    about,
+    departs,
+    explained,
+    gains_with,
+    gather_about,
+    likelihood,
+    model_alone,
+)
 from sim2real.flown.steps import FARTHEST
 from sim2real.library.candidates import Bank, at_few_sizes
 from sim2real.posterior.attribution import nuisance_mean, of_one, reduce, with_prior
@@ -18,27 +27,32 @@ from sim2real.posterior.hypotheses import Hypothesis
 from sim2real.posterior.singles import fit_family
 from sim2real.prediction.gusts import Kind
 from sim2real.prediction.kalman import Gain
+from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.courses import Course, Courses
-from sim2real.signatures.gust_intensity import SIGMAS, TURNING, asked
+from sim2real.signatures.gust_intensity import TURNING, asked, strongest
 from sim2real.signatures.tempering import temper, total
 
 PLAIN, GUESSES = 20.0, 4  # log evidence by which an effect is plain to see, and how many of these are flown
 
 
 class Guess(NamedTuple):
-    """A settled model, gains with what is plain to see in it, and the sum of the records' log likelihoods with that."""
+    """Where the model settled, the records about it with what is plain to see in it, and their gains with that."""
 
-    settled: Settled
+    begun: Followed
+    flights: list[Reconstruction]
     gains: list[Gain]
-    likelihood: float
 
     @property
     def kind(self) -> Kind:
         """That of the gusts."""
         return self.gains[0].gusts.kind
 
+    def likelihood(self) -> float:
+        """Sum of the records' log likelihoods of a sample."""
+        return likelihood(self.flights, self.gains)
 
-def likeliest_guess(ways: Sequence[Settled], candidates: Bank, baseline: Baseline, untestable: Iterable[str]) -> Guess:
+
+def likeliest_guess(ways: Sequence[Followed], candidates: Bank, baseline: Baseline, untestable: Iterable[str]) -> Guess:
     """The likeliest of the guesses about a model that was settled in gusts of several kinds.
 
     What a gap makes of a model that has none passes for a kind of gusts; with the gap in it, the likelihood tells. It
@@ -51,19 +65,19 @@ def likeliest_guess(ways: Sequence[Settled], candidates: Bank, baseline: Baselin
         needed = 0.0 if other.kind == best.kind else TURNING[0] * len(other.gains)
         if other.kind.rotation and not best.kind.rotation:
             needed = sum(asked(gain) for gain in other.gains)
-        sense = other.kind == best.kind or min(gain.sigma for gain in other.gains) < SIGMAS[-1]
-        if sense and other.likelihood > best.likelihood + needed:
+        sense = other.kind == best.kind or not strongest(other.gains)
+        if sense and other.likelihood() > best.likelihood() + needed:
             best = other
     return best
 
 
-def first_guess(settled: Settled, candidates: Bank, baseline: Baseline, untestable: Iterable[str]) -> Guess:
+def first_guess(begun: Followed, candidates: Bank, baseline: Baseline, untestable: Iterable[str]) -> Guess:
     """Gains with the likeliest single effect in the model, if one is plain to see; else those known.
 
     A gap passes for gust. What all variants would have to be flown again for is seen with a few of them.
     """
-    flights, centre, known = settled
-    alone = Guess(settled, known, settled.likelihood(candidates))
+    flights, centre, known = begun
+    alone = Guess(begun, about(flights, candidates, centre), known)
     few = at_few_sizes(candidates, untestable)
     evidences = gather_about(flights, few, centre, known)
     gram = with_prior(total(evidences), few, baseline.precision, centre)
@@ -86,5 +100,4 @@ def first_guess(settled: Settled, candidates: Bank, baseline: Baseline, untestab
     found = gains_with(flying, guess, point.nuisances, 1)
     if departs(model_alone(flights, few, centre, found)):
         return alone
-    moved = [explained(flight, few, guess, point.nuisances) for flight in flights]
-    return Guess(settled, found, likelihood(moved, found))
+    return Guess(begun, [explained(flight, few, guess, point.nuisances) for flight in flights], found)

@@ -32,6 +32,7 @@ from sim2real.signatures.gust_intensity import (
     choose_gain,
     kind_of_gusts,
     likelihoods,
+    strongest,
     turns,
 )
 from sim2real.signatures.tempering import temper, total
@@ -78,19 +79,24 @@ def _at_first(flight: Reconstruction, kind: Kind) -> Gain:
     return follow(flight, found) if slow(flight) else found.with_start()
 
 
-class Settled(NamedTuple):
+class Followed(NamedTuple):
     """Records, and where the model settles that has no gap: its nuisances [n], and the gains of each record."""
 
     flights: list[Reconstruction]
     centre: FloatArray
     known: list[Gain]
 
+    @property
+    def kind(self) -> Kind:
+        """That of the gusts."""
+        return self.known[0].gusts.kind
+
     def likelihood(self, candidates: Bank) -> float:
         """Sum of the records' log likelihoods of a sample."""
         return likelihood(about(self.flights, candidates, self.centre), self.known)
 
 
-def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline, kind: Kind = LATER) -> Settled:
+def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline, kind: Kind = LATER) -> Followed:
     """The records, with the settled model's nuisances and gains; arguments as in `settle`.
 
     A model that is no longer corrected enough to keep to a record departs from it, and nothing can be told of what
@@ -101,11 +107,11 @@ def followed(flights: Sequence[Reconstruction], candidates: Bank, baseline: Base
         centre, known = settle(flights, candidates, baseline, kind)
         if not departs(model_alone(flights, candidates, centre, known)):
             break
-    return Settled(list(flights), centre, known)
+    return Followed(list(flights), centre, known)
 
 
 def followed_in_any(flights: Sequence[Reconstruction], candidates: Bank, baseline: Baseline, kind: Kind
-                    ) -> list[Settled]:  # fmt: skip
+                    ) -> list[Followed]:  # fmt: skip
     """The same in gusts of `kind`, or where the air turns, in the likelier of the kinds that turn it.
 
     Settled in gusts of another kind, often several times as strong as they were, derivatives go as far as they may, and
@@ -121,8 +127,8 @@ def followed_in_any(flights: Sequence[Reconstruction], candidates: Bank, baselin
         rolls = [nuisance.name.startswith(("Cl_", "Cn_")) for nuisance in candidates.nuisances]
         believed = likely is found or np.max(np.abs(likely.centre[rolls])) < MOVED
         return [likely] if believed else [found, likely]
-    told = all(flight.inadequacy.walk <= 1.0 for flight in found.flights)
-    others = STRAIGHT if told and min(gain.sigma for gain in found.known) >= SIGMAS[-1] else ()
+    told = all(flight.inadequacy.followed for flight in found.flights)
+    others = STRAIGHT if told and strongest(found.known) else ()
     return [found, *(followed(flights, candidates, baseline, other) for other in others if other != kind)]
 
 

@@ -48,6 +48,11 @@ class Inadequacy:
     colour: dict[str, float] = field(default_factory=dict)
     means: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def followed(self) -> bool:
+        """Whether the states are disturbed by no more than those of an aircraft that the model follows."""
+        return self.walk <= 1.0
+
     def with_walk(self, least: float) -> Inadequacy:
         """The same with at least so much disturbance."""
         return replace(self, walk=max(self.walk, least))

@@ -57,7 +57,7 @@ def kind_at_first(flights: Sequence[Reconstruction], usual: Kind = LATER) -> Kin
     kind, the model settles where no other kind makes sense any more. Whether the air turns is not asked yet: a gap in
     roll makes more of it than any spread. `usual`: where nothing is said of it.
     """
-    told = [flight for flight in flights if flight.inadequacy.walk <= 1.0]
+    told = [flight for flight in flights if flight.inadequacy.followed]
     return STRAIGHT[int(np.argmax(np.sum(each(_at_first, told), axis=0)))] if told else usual
 
 
@@ -90,7 +90,7 @@ def turns(flights: Sequence[Reconstruction], found: Sequence[Gain]) -> bool:
     Of other kinds gusts often look several times as strong as they are, up to the strongest: any is tried. Nothing
     is said where the model is known to follow poorly, or in calm.
     """
-    told = [of for of in zip(flights, found, strict=True) if of[0].inadequacy.walk <= 1.0 and of[1].sigma >= CALM]
+    told = [of for of in zip(flights, found, strict=True) if of[0].inadequacy.followed and of[1].sigma >= CALM]
     return bool(told) and bool(np.max(np.sum(each(_turning, *zip(*told, strict=True)), axis=0)) > 0.0)
 
 
@@ -114,7 +114,7 @@ def kind_of_gusts(flights: Sequence[Reconstruction], found: Sequence[Gain], push
         found: gains of each record, of gusts of one kind.
         pushed: generic discrepancies that the model is flown with, of each record.
     """
-    told = [of for of in zip(flights, found, pushed, strict=True) if of[0].inadequacy.walk <= 1.0]
+    told = [of for of in zip(flights, found, pushed, strict=True) if of[0].inadequacy.followed]
     if not told:
         return found[0].gusts.kind
     return KINDS[int(np.argmax(np.sum(each(_in_favour, *zip(*told, strict=True)), axis=0)))]
@@ -143,8 +143,13 @@ def _in_favour(flight: Reconstruction, found: Gain, pushed: Sequence[Push]) -> l
             gain_of = gained(gain)
         # that it turns was paid for, and of one strength the kinds look stronger or weaker than they are
         paid = 0.5 * asked(found) if kind.rotation and found.gusts.kind.rotation else asked(gain)
-        out.append(min(gain_of, 0.0) if gain.sigma == SIGMAS[-1] and kind != LATER else gain_of - paid)
+        out.append(min(gain_of, 0.0) if strongest([gain]) and kind != LATER else gain_of - paid)
     return out
+
+
+def strongest(found: Sequence[Gain]) -> bool:
+    """Whether only the strongest gusts make sense, along every record: what is not understood passes for gusts."""
+    return all(gain.sigma == SIGMAS[-1] for gain in found)
 
 
 def asked(gain: Gain) -> float:
