@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import butter, lfilter
 
 from estimators.compatibility.flow_angles import at_centre_of_gravity
+from estimators.signals.instruments import calibrated, with_prompt_attitudes
 from icing_env import scenario
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord
@@ -100,6 +102,44 @@ def test_declared_instruments_are_the_models() -> None:
         assert partly[name] == file[name]
 
 
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_a_low_pass_is_as_late_as_a_filter_of_its_order(order: int) -> None:
+    """A slow change, through Butterworth's."""
+    said = reconstruct(stating(flown(), {"filter": {"frequency": 5.0, "order": order}})).parameters
+    ramp = 1e-3 * np.arange(4000)
+    shown = lfilter(*butter(order, 5.0, fs=1000.0), ramp)
+    late = lateness(1.0 / (2.0 * np.pi * float(said["filter_frequency"][0])), 0.02)
+    assert late == pytest.approx(ramp[-1] - shown[-1], rel=1e-3)
+
+
+def test_attitudes_that_are_declared_late_are_no_more() -> None:
+    """By the rates, in turns, blanks left as they were; what else is declared stays, and a second time does nothing."""
+    record, lag = flown(), 0.04
+    late = {name: np.interp(record.time - lag, record.time, record[name]) for name in ("phi", "theta", "psi")}
+    late["phi"][5] = np.nan
+    told = stating(replace(record, channels={**record.channels, **late}),
+                   {"attitude": {"lag": lag}, "alpha": {"lag": 0.01}})  # fmt: skip
+    found = with_prompt_attitudes(told)
+    for name, behind in late.items():
+        off, was = (np.nanstd((angle - record[name])[5:]) for angle in (found[name], behind))
+        assert off < max(0.1 * was, 5e-4)
+    assert np.isnan(found["phi"][5]) and np.isfinite(found["phi"][6:]).all()
+    assert found.meta.sensors == {"attitude": {}, "alpha": {"lag": 0.01}}
+    assert [p.channel for p in found.problems] == ["phi", "theta", "psi"] and all(p.repaired for p in found.problems)
+    assert with_prompt_attitudes(found) is found
+    for again in (with_recorder([told])[0], calibrated(told)):
+        assert np.array_equal(again["theta"], found["theta"])
+
+
+def test_late_attitudes_without_gyros_are_brought_forward_by_their_own_slope() -> None:
+    record = flown()
+    theta = np.interp(record.time - 0.04, record.time, record["theta"])
+    stated = replace(record.meta, sensors={"attitude": {"lag": 0.04}})
+    told = FlightRecord({"time": record.time, "theta": theta}, stated)
+    found = with_prompt_attitudes(told)["theta"]
+    assert np.std(found - record["theta"]) < 0.3 * np.std(theta - record["theta"])
+
+
 def test_a_flown_record_declares_the_instruments_it_has() -> None:
     """Through its side file, the model is that of the aircraft file again."""
     own = fly(scenario.load("clear_air", duration=6.0), observer=False, protection=False).record
@@ -134,7 +174,8 @@ def test_sensors_away_from_the_centre_of_gravity_are_brought_there() -> None:
 
 
 @pytest.mark.parametrize("sensors", [{"filter": {"lag": "fast"}}, {"filter": {"frequency": -1.0}},
-                                     {"alpha": {"lag": 3.0}}, {"accelerometers": {"position": [1.0]}}])
+                                     {"alpha": {"lag": 3.0}}, {"accelerometers": {"position": [1.0]}},
+                                     {"filter": {"frequency": 10.0, "order": "two"}}])
 def test_a_declaration_that_is_none_is_refused(sensors: dict[str, Any]) -> None:
     """With a line that names it."""
     with pytest.raises(InputError, match="sensors"):

@@ -174,6 +174,14 @@ def test_everything_measured_has_a_column_in_the_same_unit() -> None:
     ("[sensors.accelerometer]\nposition_m = [0.1, 0.0, 0.2]\n", {"accelerometers": {"position": [0.1, 0.0, 0.2]}}),
     ("[sensors]\npitot = {lag = 0.08}\nrecorder = {frequency_hz = 10.0}\n",
      {"airspeed": {"lag": 0.08}, "filter": {"frequency": 10.0}}),
+    ("[sensors]\nalpha = {lag = 0.0, filter_hz = 12.0}\naccelerometer = {filter_hz = 10.0}\nins = {latency = 0.02}\n"
+     "gyros = {filter = {lag = 0.003}}\n",
+     {"alpha": {"lag": 0.0}, "accelerometers": {}, "attitude": {"lag": 0.02},
+      "filter": {"frequency": 10.0, "order": 2}}),
+    ("[sensors]\nalpha = {filter_hz = 12.0}\nfilter = {cutoff_hz = 20.0}\n",
+     {"alpha": {}, "filter": {"frequency": 20.0}}),
+    ("[sensors]\nalpha = {filter_hz = 0.0}\nbeta = {filter_hz = 15.0}\n",
+     {"alpha": {}, "beta": {}, "filter": {"frequency": 15.0, "order": 2}}),
 ])  # fmt: skip
 def test_sensors_are_read_in_the_words_of_others_too(tmp_path, theirs, ours):
     """`corrected_to_cg` was passed over in silence, and what was corrected already corrected again."""
@@ -185,12 +193,12 @@ def test_sensors_are_read_in_the_words_of_others_too(tmp_path, theirs, ours):
 
 def test_what_is_not_read_of_sensors_is_told(tmp_path):
     (tmp_path / "a.csv").write_text("time,airspeed\n0.0,60.0\n0.02,60.0\n")
-    (tmp_path / "a.toml").write_text("[sensors]\nalpha = {lag = 0.01, filter_hz = 10.0}\nattitude = {lag = 0.02}\n")
+    (tmp_path / "a.toml").write_text("[sensors]\nalpha = {lag = 0.01, colour = 10.0}\ncompass = {lag = 0.02}\n")
     record = read(tmp_path / "a.csv")
     assert record.meta.sensors == {"alpha": {"lag": 0.01}}
     (told,) = record.problems
     assert (told.channel, told.repaired) == ("sensors", False)
-    assert told.kind == "not read of the side file: sensors.alpha.filter_hz, sensors.attitude"
+    assert told.kind == "not read of the side file: sensors.alpha.colour, sensors.compass"
 
 
 def test_sensors_that_are_no_table_are_refused(tmp_path):

@@ -3,8 +3,8 @@
 The side file of a record may declare, for `alpha`, `beta` and `airspeed`, a `lag` (s), the time by which a slow change
 shows late: the time constant of a first-order lag, y + lag y' = x. A flow angle that shows late by tau looks like a
 moment by q and takes tau 2V/c of Cm_alpha into Cm_q: 11.6 ms are 4 % of it. `alpha` may declare `bending` (rad s2/m):
-the boom bends with the normal acceleration, and alpha reads too much by bending (az + g). Where nothing is declared,
-nothing is done.
+the boom bends with the normal acceleration, and alpha reads too much by bending (az + g). `attitude` may declare the
+`lag` of all three angles: the gyros tell how fast they change. Where nothing is declared, nothing is done.
 
 The lag is undone by its inverse, x = y + lag y', with y' by local quadratics (Savitzky & Golay), over as few samples
 as leave the noise of lag y' below a part `QUIET` of that of y: the slope over n samples dt apart has
@@ -15,7 +15,7 @@ stays late. Source of the model: Klein & Morelli, Aircraft System Identification
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,7 +27,7 @@ from icing_env.atmosphere import G0
 from icing_env.errors import InputError
 from icing_env.record import DataProblem, FlightRecord, FloatArray
 
-LAGGED = ("alpha", "beta", "airspeed")
+LAGGED, ATTITUDES = ("alpha", "beta", "airspeed"), ("phi", "theta", "psi")
 QUIET = 0.2  # noise that the correction may add, over that of the channel (assumed: 2 % more standard deviation)
 LONGEST = 0.5  # s: a lag beyond it is no flow vane's or pitot tube's, and first order would not do (assumed)
 
@@ -70,6 +70,37 @@ def _number(sensors: Mapping[str, Any], name: str, key: str) -> float:
     return float(value)
 
 
+def with_prompt_attitudes(record: FlightRecord) -> FlightRecord:
+    """The record without the lag that it declares of its attitudes, told among its `problems`; else as it is.
+
+    Raises:
+        InputError: as `calibration`.
+    """
+    lag, late = _number(record.meta.sensors, "attitude", "lag"), [n for n in ATTITUDES if n in record.channels]
+    if not 0.0 <= lag <= LONGEST:
+        raise InputError(f"sensors.attitude.lag must be 0 to {LONGEST:g} s, got {lag:g}")
+    if lag == 0.0 or not late:
+        return record
+    grid = common_grid(record)
+    turning = {name: rate(grid.values[name], grid.dt, lag) for name in late}
+    if all(name in grid.values for name in ("p", "q", "r", "phi", "theta")):
+        turning = _turning(grid.values)
+    channels = dict(record.channels)
+    for name in late:
+        channels[name] = channels[name] + lag * np.interp(record.time, grid.time, turning[name])
+    start, end = float(record.time[0]), float(record.time[-1])
+    told = [DataProblem(name, f"lag of {lag:.3g} s taken out, as declared", start, end, True) for name in late]
+    done = _done(record.meta.sensors, ["attitude"])
+    return replace(record, channels=channels, meta=replace(record.meta, sensors=done)).with_problems(told)
+
+
+def _turning(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Rates of the attitudes, rad/s (N,): Klein & Morelli (2006), chapter 3."""
+    p, q, r, phi, theta = (values[name] for name in ("p", "q", "r", "phi", "theta"))
+    aside = q * np.sin(phi) + r * np.cos(phi)
+    return {"phi": p + np.tan(theta) * aside, "theta": q * np.cos(phi) - r * np.sin(phi), "psi": aside / np.cos(theta)}
+
+
 def calibrated(record: FlightRecord) -> FlightRecord:
     """The record without the lags and the bending that it declares, each told among its `problems`; else as it is.
 
@@ -78,6 +109,7 @@ def calibrated(record: FlightRecord) -> FlightRecord:
     Raises:
         InputError: as `calibration`.
     """
+    record = with_prompt_attitudes(record)
     known = calibration(record.meta.sensors)
     if not known.stated:
         return record
@@ -94,18 +126,18 @@ def calibrated(record: FlightRecord) -> FlightRecord:
             late = lag * np.interp(record.time, grid.time, rate(grid.values[name], grid.dt, lag))
             channels[name] = channels[name] + late
             found.append(DataProblem(name, f"lag of {lag:.3g} s taken out, as declared", start, end, True))
-    return replace(record, channels=channels, meta=replace(record.meta, sensors=_done(record.meta.sensors))
-                   ).with_problems(found)  # fmt: skip
+    done = _done(record.meta.sensors, LAGGED)
+    return replace(record, channels=channels, meta=replace(record.meta, sensors=done)).with_problems(found)
 
 
 def _times(record: FlightRecord) -> FloatArray:
     return common_grid(record).time
 
 
-def _done(sensors: Mapping[str, Any]) -> dict[str, Any]:
+def _done(sensors: Mapping[str, Any], corrected: Iterable[str]) -> dict[str, Any]:
     """The table without what has been corrected."""
     left = dict(sensors)
-    for name in LAGGED:
+    for name in corrected:
         if isinstance(sensors.get(name), Mapping):
             left[name] = {key: value for key, value in sensors[name].items() if key not in ("lag", "bending")}
     return left

@@ -22,7 +22,7 @@ from sim2real.signatures.courses import Course, Courses, Remainder, in_time
 SIZES = (0.003, 0.01, 0.03, 0.1, 0.3)  # standard deviations of the heights, in units of a generic coefficient (assumed)
 SHARE = 1.0 / 3.0  # prior share of what is unknown at a component that generic terms do not follow (assumed)
 ALIKE = 0.01  # of what generic terms gain, that another way has to gain beyond them to be told instead (assumed)
-TOGETHER, MOST = 7, 5e8  # components whose responses are computed at once, and bytes that these may take
+TOGETHER, MOST = 7, 1.2e8  # components whose responses are computed at once, and bytes that these may take
 GUSTY = 0.3  # m/s of gusts, in which a course of the wind counts half (set on clean aircraft)
 PLACES = in_time({component for component, _, _ in (*GENERIC, *BEYOND)})
 

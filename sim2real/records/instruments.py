@@ -1,10 +1,11 @@
 """What a record's instruments do to what they read: as its side file declares, else as the aircraft file has them.
 
 The table `sensors` may declare, beside what identification reads (`estimators.signals.instruments`), the low pass of
-the recorder: `filter = { lag = 0.008 }` in s by which a slow change shows late, or `{ frequency = 10.0 }` in Hz, 0 for
-none. It acts on flow angles, rates, accelerations and surfaces, and not on attitudes. Those therefore tell of it, since
-an attitude is the integral of rates whatever flies (Klein & Morelli, Aircraft System Identification, AIAA 2006, chapter
-10): what is integrated from rates that are late by L lacks L times the rate.
+the recorder: `filter = { lag = 0.008 }` in s by which a slow change shows late, or `{ frequency = 10.0, order = 2 }` of
+a Butterworth filter in Hz (0: none; first order if not told). It acts on flow angles, rates, accelerations and
+surfaces, and not on attitudes. Those therefore tell of it, since an attitude is the integral of rates whatever flies
+(Klein & Morelli, Aircraft System Identification, AIAA 2006, chapter 10): what is integrated from rates that are late by
+L lacks L times the rate.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from estimators.compatibility.flow_angles import at_centre_of_gravity
 from estimators.signals.data_checks import repaired
-from estimators.signals.instruments import calibration, rate, time_constant
+from estimators.signals.instruments import calibration, rate, time_constant, with_prompt_attitudes
 from estimators.signals.resample import common_grid
 from icing_env import aircraft
 from icing_env.errors import InputError
@@ -41,7 +42,11 @@ def lateness(lag: float, dt: float) -> float:
 
 
 def with_recorder(records: Sequence[FlightRecord]) -> list[FlightRecord]:
-    """Records that declare no low pass declare the one that their attitudes tell of, where it is not the file's."""
+    """Records that declare no low pass declare the one that their attitudes tell of, where it is not the file's.
+
+    Attitudes that are declared to be late are so no more.
+    """
+    records = [with_prompt_attitudes(record) for record in records]
     told = recorder_lags([record for record in records if "filter" not in record.meta.sensors])
     if told is None:
         return list(records)
@@ -156,14 +161,15 @@ def thrust_was_measured(record: FlightRecord) -> bool:
 
 def _recorder(row: NDArray, sensors: Any, dt: float, notes: list[str]) -> None:
     table = _table(sensors, "filter")
-    for key in ("lag", "frequency"):
+    for key in ("lag", "frequency", "order"):
         value = table.get(key, 0.0)
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
             raise InputError(f"sensors.filter.{key} must be a number, 0 for no low pass, got {value!r}")
     if "lag" in table:
         late = float(table["lag"])
     elif "frequency" in table:
-        late = 1.0 / (2.0 * math.pi * table["frequency"]) if table["frequency"] else 0.0
+        slope = 1.0 / math.sin(0.5 * math.pi / max(table.get("order", 1), 1))  # of its phase at low frequencies
+        late = slope / (2.0 * math.pi * table["frequency"]) if table["frequency"] else 0.0
     elif abs(dt - STEP) > 1e-6:
         late = _published_lag()
     else:
