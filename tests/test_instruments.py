@@ -129,7 +129,7 @@ def test_attitudes_that_are_declared_late_are_no_more() -> None:
     found = with_prompt_attitudes(told)
     for name, behind in late.items():
         off, was = (np.nanstd((angle - record[name])[5:]) for angle in (found[name], behind))
-        assert off < 0.3 * was
+        assert off < 0.1 * was + 2.5e-4  # and what smoothing leaves of their noise
     assert np.isnan(found["phi"][5]) and np.isfinite(found["phi"][6:]).all()
     assert found.meta.sensors == {"attitude": {}, "alpha": {"lag": 0.01}}
     assert [p.channel for p in found.problems] == ["phi", "theta", "psi"] and all(p.repaired for p in found.problems)
