@@ -84,7 +84,7 @@ def with_prompt_attitudes(record: FlightRecord) -> FlightRecord:
     grid = common_grid(record)
     turning = {name: rate(grid.values[name], grid.dt, lag) for name in late}
     if all(name in grid.values for name in ("p", "q", "r", "phi", "theta")):
-        turning = _turning(grid.values)
+        turning = attitude_rates(grid.values)
     channels = dict(record.channels)
     for name in late:
         channels[name] = channels[name] + lag * np.interp(record.time, grid.time, turning[name])
@@ -94,8 +94,12 @@ def with_prompt_attitudes(record: FlightRecord) -> FlightRecord:
     return replace(record, channels=channels, meta=replace(record.meta, sensors=done)).with_problems(told)
 
 
-def _turning(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Rates of the attitudes, rad/s (N,): Klein & Morelli (2006), chapter 3."""
+def attitude_rates(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Rates of phi, theta and psi that body rates make, rad/s (N,): Klein & Morelli (2006), chapter 3.
+
+    Args:
+        values: p, q, r [rad/s], phi and theta [rad], each (N,).
+    """
     p, q, r, phi, theta = (values[name] for name in ("p", "q", "r", "phi", "theta"))
     aside = q * np.sin(phi) + r * np.cos(phi)
     return {"phi": p + np.tan(theta) * aside, "theta": q * np.cos(phi) - r * np.sin(phi), "psi": aside / np.cos(theta)}

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from estimators.compatibility.flow_angles import at_centre_of_gravity
 from estimators.signals.data_checks import repaired
-from estimators.signals.instruments import calibration, rate, time_constant, with_prompt_attitudes
+from estimators.signals.instruments import attitude_rates, calibration, rate, time_constant, with_prompt_attitudes
 from estimators.signals.resample import common_grid
 from icing_env import aircraft
 from icing_env.errors import InputError
@@ -86,10 +86,8 @@ def _of_attitudes(record: FlightRecord) -> tuple[FloatArray, FloatArray] | None:
     if len(at) < 20 * FEWEST:
         return None
     grid = common_grid(record)
-    p, q, r, phi, theta = (grid.values[n] for n in RATES)
-    turning = q * np.sin(phi) + r * np.cos(phi)
-    return (_in_spans(theta, q * np.cos(phi) - r * np.sin(phi), phi, grid.dt, at),
-            _in_spans(phi, p + np.tan(theta) * turning, theta, grid.dt, at))
+    made, phi, theta = attitude_rates(grid.values), grid.values["phi"], grid.values["theta"]
+    return _in_spans(theta, made["theta"], phi, grid.dt, at), _in_spans(phi, made["phi"], theta, grid.dt, at)
 
 
 def _slow_attitudes(record: FlightRecord, missing: dict[str, float]) -> NDArray[np.intp]:
