@@ -7,16 +7,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
-from icing_env import aircraft, effects
+from icing_env import effects
 from icing_env.errors import InputError, nearest
 from icing_env.record import FlightRecord, FloatArray
 from sim2real.actuators.servos import of_all_servos
 from sim2real.actuators.surfaces import placed
 from sim2real.actuators.timing import in_step
 from sim2real.answer import credible, describe, detection_limits, judge, problems, provenance, ranked
-from sim2real.baseline.loading import of_another_loading, otherwise_loaded
+from sim2real.baseline.loading import of_another_loading, of_published, otherwise_loaded
 from sim2real.baseline.quasi_steady import NOTE, simpler, undoes_the_lag, without_lag, worth_trying
 from sim2real.baseline.references import Baseline, fit_baseline, uncertain
 from sim2real.change import Changed, changed, flown_freely
@@ -169,7 +167,7 @@ def _at_hand(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord], 
         if name not in effects.LIBRARY:
             raise InputError(f"no effect '{name}' to leave out: {nearest(name, list(effects.LIBRARY))}")
     candidates = bank(without, uncertain() if reference else ())
-    baseline = Baseline(aircraft.load(), np.eye(len(candidates.nuisances)))
+    baseline = of_published(candidates.nuisances)
     if reference:
         progress("fitting the model to the reference flights")
         baseline = fit_baseline(_reconstructed(reference, None, simulator), candidates)

@@ -10,6 +10,7 @@ from icing_env.aircraft import load
 from icing_env.effects import DESCRIPTIONS, LIBRARY, parse, with_effects
 from icing_env.effects.derivatives import NUMBERS, OFFSETS
 from icing_env.record import FlightRecord
+from sim2real.baseline.loading import of_published
 from sim2real.closing.own_numbers import own_numbers, with_own_numbers
 from sim2real.closing.remedy import Remedy
 from sim2real.diagnosis import Diagnosis, diagnose
@@ -81,7 +82,9 @@ def test_the_numbers_are_told_with_errors_that_hold_the_truth(found):
     assert set(told) == {*NUMBERS, *OFFSETS}
     off = [(one["change"] - OFF.get(name, 0.0)) / one["std_error"] for name, one in told.items()]
     assert np.sqrt(np.mean(np.square(off))) < 1.8
-    spread = {move.name: move.factor for move in nuisances()}
+    moves = nuisances()
+    before = np.sqrt(np.diag(np.linalg.inv(of_published(moves).precision)))
+    spread = {move.name: move.factor * sd for move, sd in zip(moves, before, strict=True)}
     assert all(0.0 < one["std_error"] < 1.1 * OWN_NUMBERS * spread[name] for name, one in told.items())
 
 

@@ -8,12 +8,24 @@ import numpy as np
 import pytest
 from generated import in_still_air
 
+from icing_env import scenario
 from icing_env.aircraft import load
 from icing_env.record import FlightRecord, RecordMeta
-from sim2real.baseline.loading import CENTRE, INERTIA, of_another_loading, otherwise_loaded
+from sim2real.baseline.loading import CENTRE, INERTIA, of_another_loading, of_published, otherwise_loaded
 from sim2real.baseline.references import Baseline, directions, uncertain
 from sim2real.diagnosis import diagnose
-from sim2real.library.candidates import SIGNED, SPREAD, TOLD_ONCE, bank, nuisances, shifted
+from sim2real.library.candidates import (
+    INSTRUMENTS,
+    RIGGING,
+    SIGNED,
+    SPREAD,
+    TOLD_ONCE,
+    WEAK,
+    bank,
+    nuisances,
+    shifted,
+)
+from testbed.flight import fly
 from testbed.withheld.flights import Aircraft
 
 BIASES = {"bias_alpha": 2e-3, "bias_beta": -1.5e-3, "bias_q": 5e-4, "bias_az": 0.03, "bias_theta": 1.5e-3}
@@ -32,8 +44,7 @@ def test_offsets_that_all_flights_have_are_no_gap_and_one_beside_them_is(tmp_pat
 
 @pytest.mark.parametrize(("times", "gap"), [(1.0, False), (4.0, True)])
 def test_without_references_offsets_beyond_a_calibration_are_a_gap(tmp_path, times, gap):
-    offsets = {name: times * offset for name, offset in BIASES.items() if name != "bias_q"}  # zeroed at rest
-    own = Aircraft(terms=offsets)
+    own = Aircraft(terms={name: times * offset for name, offset in BIASES.items()})
     assert (diagnose(in_still_air(tmp_path, "diagnose", own, 2)).verdict != "no_gap") == gap
 
 
@@ -44,10 +55,33 @@ def test_a_number_that_one_source_tells_may_be_another_without_a_gap(tmp_path, n
     assert diagnose(in_still_air(tmp_path, "diagnose", beyond, 4)).verdict != "no_gap"
 
 
+def flown(off: dict[str, float]) -> FlightRecord:
+    """Doublets in still air, instruments and rigging off by so much."""
+    row = load()
+    parameters = {name: float(row[name][0]) + size for name, size in off.items()}
+    chosen = scenario.load("clear_air", duration=52.0, parameters={"turbulence_sigma_w": 0.0, **parameters})
+    return fly(chosen, seed=4, observer=False, protection=False).record
+
+
+def test_what_calibration_and_rigging_leave_is_no_gap():
+    """All of it at once; of gyros, pick-ups and rigging nothing was allowed for, and every such aircraft blamed."""
+    signs = np.random.default_rng(1).choice([-1.0, 1.0], len(INSTRUMENTS | RIGGING))
+    off = {name: sign * size for (name, size), sign in zip((INSTRUMENTS | RIGGING).items(), signs, strict=True)}
+    found = diagnose([flown(off)])
+    assert found.verdict == "no_gap", found.hypotheses[:3]
+
+
+@pytest.mark.parametrize(("name", "where"), [("bias_q", "sensor:q"), ("Cl_0", "rolling_moment"),
+                                             ("aileron_offset", "aileron_path")])  # fmt: skip
+def test_ten_times_as_much_is_one(name, where):
+    found = diagnose([flown({name: 10.0 * (INSTRUMENTS | RIGGING)[name]})])
+    assert found.verdict != "no_gap" and found.where["components"][where] > 0.5, found.hypotheses[:3]
+
+
 @pytest.mark.parametrize("number", SIGNED)
 def test_such_a_number_may_have_the_other_sign_without_a_gap(tmp_path, number):
     """Held at a tenth of the published one, and stepped by parts of what it was moved to, one in nine was a gap."""
-    other = Aircraft(baseline={number: 1.0 - 2.5 * TOLD_ONCE[number]})
+    other = Aircraft(baseline={number: 1.0 - 2.5 * (WEAK | TOLD_ONCE)[number]})
     assert diagnose(in_still_air(tmp_path, "diagnose", other, 4)).verdict == "no_gap"
 
 
@@ -61,10 +95,10 @@ def test_deviations_of_such_numbers_add():
     both = shifted(row, moves, 2.0 * one, "torque")
     for name in SIGNED:
         assert twice[name][0] == pytest.approx(both[name][0])
-        assert both[name][0] == pytest.approx((1.0 - 3.4 * TOLD_ONCE[name]) * row[name][0])
+        assert both[name][0] == pytest.approx((1.0 - 3.4 * (WEAK | TOLD_ONCE)[name]) * row[name][0])
     fitted = shifted(row, directions(bank()), np.array([move.name in SIGNED for move in directions(bank())]), "torque")
     for name in SIGNED:  # of reference flights, in steps of that size
-        assert fitted[name][0] - row[name][0] == pytest.approx(TOLD_ONCE[name] * abs(row[name][0]))
+        assert fitted[name][0] - row[name][0] == pytest.approx((WEAK | TOLD_ONCE)[name] * abs(row[name][0]))
 
 
 def loaded(mass: float | None, inertia: float = 1.0) -> FlightRecord:
@@ -78,6 +112,16 @@ def loaded(mass: float | None, inertia: float = 1.0) -> FlightRecord:
 ])  # fmt: skip
 def test_a_loading_is_another_one_where_masses_say_so(one, other, otherwise):
     assert otherwise_loaded([loaded(*one)], [loaded(*other)]) == otherwise
+
+
+def test_the_published_model_is_as_uncertain_of_a_loading():
+    """Inertias and c.g. that papers tell move the moments' derivatives together, as no spread of single ones does."""
+    moves = nuisances()
+    covariance = np.linalg.inv(of_published(moves).precision)
+    at = {move.name: j for j, move in enumerate(moves)}
+    assert covariance[at["Cl_p"], at["Cl_beta"]] == pytest.approx((INERTIA / SPREAD) ** 2)
+    assert covariance[at["CZ_alpha"], at["Cm_q"]] == pytest.approx(0.0)
+    assert covariance[at["CZ_alpha"], at["CZ_alpha"]] == pytest.approx(1.0)
 
 
 def test_another_loading_leaves_moments_uncertain_and_forces_as_they_were():

@@ -217,6 +217,28 @@ def test_aircraft_of_a_calibrated_set_are_as_before_but_for_what_nobody_knows_be
     assert draw.Population(calibrated=True).told() == {"calibrated": True}
 
 
+def test_aircraft_of_a_rigged_set_are_as_before_but_for_rigging():
+    kind = {"gusts": "mixed", "calibrated": True}
+    before = draw.Population(**kind).placed(draw.designs(40, 3), 3)
+    today = draw.Population(**kind, rigged=True).placed(draw.designs(40, 3), 3)
+    own = {**draw.RIGGING, **draw.GEARING}
+    for was, now in zip(before, today, strict=True):
+        assert replace(now, baseline=was.baseline) == was
+        assert now.baseline == was.baseline | {name: now.baseline[name] for name in own}
+    for name, size in own.items():
+        off = [case.baseline[name] - (name in draw.GEARING) for case in today]
+        assert 0.6 * size < np.std(off) < 1.5 * size and abs(np.mean(off)) < 0.6 * size
+    one = today[0].baseline
+    at, clean = flights.Aircraft(one).row(), flights.Aircraft().row()
+    for name in own:
+        if not name.startswith("bias_"):
+            assert at[name] == (clean[name] + one[name] if name in draw.RIGGING else clean[name] * one[name])
+    assert {name: flights.Aircraft(one).instruments()[name] for name in ("bias_p", "bias_q", "bias_r")} == {
+        name: one[name] for name in ("bias_p", "bias_q", "bias_r")}
+    offset = flights.Aircraft(one, (("elevator_offset", "same", 0.01),)).row()["elevator_offset"]
+    assert offset == pytest.approx(0.01 + one["elevator_offset"])
+
+
 def test_a_set_of_another_spread_says_so(tmp_path, only_nulls):
     sealed = generate.generate(tmp_path, 3, 11, population=draw.Population(spread=0.08))
     assert sealed["spread"] == 0.08 and kind_of(sealed) == "development spread 0.08"

@@ -1,4 +1,4 @@
-"""Loading: what reference flights do not tell of a flight with other fuel and freight aboard.
+"""Loading: what neither a published model nor reference flights tell of a flight with its own fuel and freight aboard.
 
 Weighing and fuel gauges leave the centre of gravity and the inertias of every loading uncertain. Moments about another
 centre of gravity are those of Etkin & Reid (Dynamics of Flight, 1996, appendix B.12): Cm + (dx/c) CZ, Cn - (dx/b) CY;
@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from icing_env import aircraft
 from icing_env.record import FlightRecord, FloatArray
 from sim2real.baseline.references import Baseline
 from sim2real.library.candidates import Nuisance
@@ -30,8 +31,13 @@ def otherwise_loaded(references: Iterable[FlightRecord], records: Iterable[Fligh
     return stated[0] != stated[1] and len(masses) > 0 and max(masses) > (1.0 + ALIKE) * min(masses)
 
 
+def of_published(nuisances: Sequence[Nuisance]) -> Baseline:
+    """The published model, of an aircraft that is loaded as its side file says."""
+    return of_another_loading(Baseline(aircraft.load(), np.eye(len(nuisances))), nuisances)
+
+
 def of_another_loading(baseline: Baseline, nuisances: Sequence[Nuisance]) -> Baseline:
-    """A baseline that reference flights corrected, for flights of another loading."""
+    """A baseline as it is known of flights whose loading is told by weighing and gauges alone."""
     moves = _moves(baseline.parameters, nuisances)
     covariance = np.linalg.inv(baseline.precision) + moves.T @ moves
     precision = np.linalg.inv(covariance)

@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from icing_env import aircraft
 from icing_env.record import FlightRecord, FloatArray
 from sim2real.baseline.inadequacy import WALKS, clean, colour, walk
-from sim2real.library.candidates import CALIBRATION, NUISANCE_STEP, Bank, Nuisance
+from sim2real.library.candidates import INSTRUMENTS, NUISANCE_STEP, Bank, Nuisance
 from sim2real.prediction.gusts import KINDS, LATER, Kind
 from sim2real.prediction.kalman import follow
-from sim2real.records.channels import SURFACES
 from sim2real.records.reconstruct import Inadequacy, Reconstruction
 from sim2real.signatures.evidence import Evidence, gather
 from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
@@ -31,14 +30,11 @@ ROUNDS, SETTLED = 10, 4.0  # flown steps, and the whitened length of one that en
 AGAIN = 2  # the round after which gust intensities are chosen anew at every step: what does not fit passes for gusts
 LONGEST = 40.0  # standard deviations that a step may move a number
 REFERENCE_SPEED = 65.0  # m/s, where a number has its value; it changes with (65/V)^2, as alpha does in level flight
-# Weak derivatives, on which sources and flights differ by 10 to 30 %: times the published spread
-WEAK = dict.fromkeys(
-    ("CZ_q", "CZ_elevator", "CY_p", "CY_r", "CY_rudder", "Cl_r", "Cl_rudder", "Cn_p", "Cn_aileron"), 3.0)
 CHANGES = 1.0  # prior standard deviation of that change at twice the dynamic pressure, in that of the value (assumed)
 # What the published spread leaves alone and another aircraft may have: standard deviations (assumed). No cubes: where
 # the references did not fly, they run away.
 BEYOND: dict[str, float] = {
-    "CY_0": 1e-3, "Cl_0": 3e-4, "Cn_0": 3e-4, "Cl_alpha": 2e-3, "Cn_alpha": 3e-3, "CX_elevator": 5e-3,
+    "Cl_alpha": 2e-3, "Cn_alpha": 3e-3, "CX_elevator": 5e-3,
     "CY_aileron": 3e-3, "Cl_q": 0.02, "Cn_q": 0.02, "Cm_p": 0.05, "Cm_r": 0.05,
     "thrust_factor_left+thrust_factor_right": 0.02,
     # with thrust
@@ -48,14 +44,8 @@ BEYOND: dict[str, float] = {
     "CZ_alpha2": 0.3, "Cm_alpha2": 0.1, "Cm_elevator2": 0.1, "CX_beta2": 0.1, "CZ_beta2": 0.3, "Cm_beta2": 0.1,
     "Cm_alpha_elevator": 0.1, "CZ_alpha_q": 5.0, "Cm_alpha_q": 5.0, "CY_alpha_beta": 0.1, "Cl_alpha_beta": 0.02,
     "Cn_alpha_beta": 0.02, "CY_alpha_p": 0.2, "Cl_alpha_p": 0.5, "Cn_alpha_p": 0.2, "Cl_alpha_r": 0.2,
-    "Cn_alpha_r": 0.2, "CY_alpha_rudder": 0.1, "Cn_alpha_aileron": 0.02, "Cn_alpha_rudder": 0.05,
-    # of gyros
-    "bias_p": 5e-4, "bias_q": 5e-4, "bias_r": 5e-4}
-# surfaces' paths and what is read of them
-PATHS = {"spool_time": 0.1,
-         **{f"{surface}_{of}": size for surface in SURFACES for of, size in (("offset", 1e-3), ("gearing", 0.01))}}
-# alike in all flights
-INSTRUMENTS = ("scale_alpha", "scale_beta", *CALIBRATION, "bias_p", "bias_q", "bias_r", *PATHS)
+    "Cn_alpha_r": 0.2, "CY_alpha_rudder": 0.1, "Cn_alpha_aileron": 0.02, "Cn_alpha_rudder": 0.05}
+ALIKE = (*INSTRUMENTS, "spool_time")  # in all flights
 STEADY = 1e-3  # the change with the flight condition of what an instrument or a path has
 # a matter of each record and its recorder
 FIXED = ("mass", "thrust", "filter_frequency", "vane_lag", "pitot_lag", "boom_gain")
@@ -111,11 +101,11 @@ def directions(candidates: Bank) -> tuple[Nuisance, ...]:
         size = nuisance.factor * (1.0 if nuisance.absolute else abs(float(row[_first(nuisance)])))
         out.append(replace(nuisance, factor=size, absolute=True, only="nowhere" if nuisance.name in FIXED else ""))
     known = {nuisance.name for nuisance in out}
-    return (*out, *(_beyond(name) for name in (*BEYOND, *PATHS) if name not in known))
+    return (*out, *(_beyond(name) for name in BEYOND if name not in known))
 
 
 def _beyond(name: str) -> Nuisance:
-    return Nuisance(name, name, (BEYOND | PATHS)[name], True)
+    return Nuisance(name, name, BEYOND[name], True)
 
 
 def uncertain() -> tuple[Nuisance, ...]:
@@ -123,14 +113,13 @@ def uncertain() -> tuple[Nuisance, ...]:
 
     What these tell badly would else be told as something unknown, or as an effect that changes the same number.
     """
-    return tuple(_beyond(name) for name in (*BEYOND, *PATHS))
+    return tuple(_beyond(name) for name in BEYOND)
 
 
 def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank) -> Baseline:
     """The model corrected by reference flights, and the precision with which they leave it."""
     moves, at = directions(candidates), np.array([_condition(float(np.median(f.channel("airspeed")))) for f in flights])
     fit = Fit(flights, moves, at)
-    fit.spread[: len(moves)] = [WEAK.get(move.name, 1.0) for move in moves]
     fit.run()
     return fit.baseline(candidates)
 
@@ -153,8 +142,8 @@ class Fit:
         n = len(moves)
         self.flights, self.moves, self.at = flights, moves, at
         self.bank = Bank(tuple(moves), (), (), 1 + n)
-        changing = [STEADY if move.name in INSTRUMENTS else CHANGES for move in moves]
-        self.widest = np.tile([1.0 if move.name in INSTRUMENTS else np.inf for move in moves], 2)
+        changing = [STEADY if move.name in ALIKE else CHANGES for move in moves]
+        self.widest = np.tile([1.0 if move.name in ALIKE else np.inf for move in moves], 2)
         self.x, self.spread = np.zeros(2 * n), np.concatenate([np.ones(n), changing])
         self.walk, self.kind = WALKS[-1], LATER  # while the model may still be far off
         self.precision = np.zeros((0, 0))

@@ -19,7 +19,7 @@ from scipy.stats import chi2
 from icing_env import effects
 from icing_env.effects.discrepancy import TERMS
 from icing_env.record import FloatArray
-from sim2real.baseline.references import INSTRUMENTS, Fit, directions
+from sim2real.baseline.references import ALIKE, Fit, directions
 from sim2real.closing import gap
 from sim2real.closing.black_box import FELT, PUSHED, residual_accelerations
 from sim2real.closing.remedy import Remedy, Values
@@ -169,7 +169,7 @@ def _numbers(flight: Reconstruction, candidates: Bank, posterior: Posterior) -> 
              and (per := _per_unit(flight, f)) is not None}  # fmt: skip
     out = []
     for move in directions(candidates):
-        if move.only or move.name in INSTRUMENTS:
+        if move.only or move.name in ALIKE:
             continue
         coefficient, _, term = move.parameter.partition("_")
         if (found := alone.get(frozenset(move.parameter.split("+")))) is not None:

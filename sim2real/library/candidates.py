@@ -23,21 +23,31 @@ from sim2real.records.channels import LATERAL, SURFACES
 from sim2real.records.reconstruct import Reconstruction
 
 # The published sets of derivatives differ by about 5 % where they are well identified: the standard deviation of the
-# model's own uncertainty. A record's mass is known to about 1 % (assumed).
+# model's own uncertainty. Weak ones differ by more, UIUC's from those of NASA's flights even by factors: by 15 % and
+# 30 % (assumed), and the yawing moment of ailerons has either sign. A record's mass is known to about 1 % (assumed).
 SPREAD, MASS_SPREAD = 0.05, 0.01
+WEAK = (dict.fromkeys(("CZ_q", "CZ_elevator", "CY_p", "CY_r", "CY_rudder", "Cn_p"), 0.15)
+        | dict.fromkeys(("Cl_r", "Cl_rudder"), 0.3) | {"Cn_aileron": 3.0})  # fmt: skip
 THRUST_SPREAD = 0.3  # of power that was not recorded and is told by the levers (assumed)
 FILTER_SPREAD = 0.1  # of the recording's cut-off: channels are in step to a few ms (assumed)
 # s, s, rad s2/m: instruments that no paper describes may as well have no lag, and no boom (assumed)
 VANE_SPREAD, PITOT_SPREAD, BOOM_SPREAD = 0.008, 0.05, 1e-4
 # Numbers of which one source or none tells: heights of thrust line and c.g. (0.15 m of 0.3), what the slipstream does
-# to lift and to the elevator (a simulator built on a published set has neither), and what part of the pitch damping
-# comes from the delay of the downwash (a quasi-steady set has it in Cm_q); assumed
-TOLD_ONCE = {"engine_arm_z": 0.5, "CZ_CT": 0.5, "Cm_elevator_CT": 0.5, "Cm_alphadot": 0.1}
-SIGNED = ("engine_arm_z", "CZ_CT", "Cm_elevator_CT")  # of these, so uncertain that they may have the other sign
-VANE_SCALE = 0.015  # of a flow vane's reading, upwash included (assumed)
-# What a calibrated installation is still off by, in the channel's unit; gyros are zeroed at rest (assumed)
+# to lift and to the elevator (a simulator built on a published set has neither), what part of the pitch damping comes
+# from the delay of the downwash (a quasi-steady set has it in Cm_q), how fast engines spool; assumed
+TOLD_ONCE = {"engine_arm_z": 0.5, "CZ_CT": 0.5, "Cm_elevator_CT": 0.5, "Cm_alphadot": 0.1, "spool_time": 0.15}
+SIGNED = ("engine_arm_z", "CZ_CT", "Cm_elevator_CT", "Cn_aileron")  # so uncertain that they may have the other sign
+# Of the readings of flow vanes, upwash included, and of gyros (assumed)
+SCALES = {"scale_alpha": 0.015, "scale_beta": 0.015, "scale_p": 0.005, "scale_q": 0.005, "scale_r": 0.005}
+# What a calibrated installation is still off by, in the channel's unit (assumed); of gyros, what attitudes say of them
+# in NASA's records of the aircraft (0.3 to 1.2 mrad/s of q in 6 to 20 s)
 CALIBRATION = {"bias_airspeed": 0.1, "bias_alpha": 8e-4, "bias_beta": 8e-4, "bias_phi": 8e-4, "bias_theta": 8e-4,
-               "bias_ax": 0.008, "bias_ay": 0.008, "bias_az": 0.01}  # fmt: skip
+               "bias_p": 5e-4, "bias_q": 5e-4, "bias_r": 5e-4, "bias_ax": 0.008, "bias_ay": 0.008, "bias_az": 0.01}
+# What rigging leaves of symmetry, about 1 mrad of aileron and rudder (Cn_0 is 5e-4 in NASA's records: Klein & Morelli,
+# Aircraft System Identification, 2006, example 5.1), and of agreement between a surface's command and its reading
+RIGGING = {"CY_0": 5e-4, "Cl_0": 2e-4, "Cn_0": 2e-4}
+PICK_UPS = {f"{surface}_{of}": size for surface in SURFACES for of, size in (("offset", 1e-3), ("gearing", 0.01))}
+INSTRUMENTS = SCALES | CALIBRATION | PICK_UPS  # alike in all flights
 LEAST = 0.1  # of any other published value: a filter or a thrust with another sign does not fly
 NODES, FEW = 4, 2  # sizes of a parameter; and where it only has to be seen whether it is worth more
 NUISANCE_STEP = 0.1  # standard deviations at which the derivative with respect to a nuisance is taken
@@ -119,15 +129,15 @@ def of_model(directions: Iterable[Nuisance], row: NDArray) -> tuple[Nuisance, ..
 
 def nuisances() -> tuple[Nuisance, ...]:
     """Derivatives by `SPREAD`, mass, what levers or one source tell, instruments and the recorder."""
-    derivatives = [Nuisance(name, name, SPREAD) for name in DERIVATIVE_NAMES]
+    derivatives = [Nuisance(name, name, WEAK.get(name, SPREAD)) for name in DERIVATIVE_NAMES]
     guessed = Nuisance("thrust", "thrust_factor_left+thrust_factor_right", THRUST_SPREAD, only="throttle")
     known = {"vane_lag": VANE_SPREAD, "pitot_lag": PITOT_SPREAD, "boom_gain": BOOM_SPREAD}
     timing = (Nuisance("filter_frequency", "filter_frequency", FILTER_SPREAD),
               *(Nuisance(name, name, spread, True) for name, spread in known.items()))
-    vanes = [Nuisance(f"scale_{c}", f"scale_{c}", VANE_SCALE, True, follows=False) for c in ("alpha", "beta")]
     told_once = [Nuisance(name, name, spread) for name, spread in TOLD_ONCE.items()]
-    offsets = [Nuisance(name, name, spread, True, follows=False) for name, spread in CALIBRATION.items()]
-    every = (*derivatives, Nuisance("mass", "mass", MASS_SPREAD), guessed, *told_once, *vanes, *offsets, *timing)
+    rigged = [Nuisance(name, name, spread, True, follows=False) for name, spread in RIGGING.items()]
+    off = [Nuisance(name, name, spread, True, follows=name in PICK_UPS) for name, spread in INSTRUMENTS.items()]
+    every = (*derivatives, *rigged, Nuisance("mass", "mass", MASS_SPREAD), guessed, *told_once, *off, *timing)
     return of_model(every, aircraft.load())
 
 

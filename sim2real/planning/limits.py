@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icing_env.record import FloatArray
+from sim2real.actuators.paths import path_gram
 from sim2real.baseline.references import Baseline
 from sim2real.flown.settling import nearer
 from sim2real.library.candidates import NUISANCE_STEP, Bank, Family, parameter_rows
 from sim2real.posterior.singles import DETECTABLE, EffectFit
 from sim2real.records.side_by_side import each
 from sim2real.signatures.evidence import Evidence, compare
+from sim2real.signatures.whitening import SETTLE
 
 ROUNDS = 5  # times that all are flown
 MOST = 3.0  # times by which a size is changed at once
@@ -83,12 +85,15 @@ def _signatures(evidences: Sequence[Evidence], candidates: Bank, families: tuple
     """
     n, rows = moved.shape[1], range(1, 1 + len(families))
     alone = replace(candidates, nuisances=(), families=families, terms=(), size=1 + len(families))
+    only = replace(candidates, families=(), terms=(), size=1 + n)
 
     def of_record(e: Evidence) -> tuple[FloatArray, FloatArray]:
         own = with_nuisances(parameter_rows(e.flight, alone), candidates, np.vstack([np.zeros(n), moved]),
                              e.flight.power_from)
         found = compare(e.flight, own, e.gain, e.factor, keep=rows)
-        return found.gram[1:, 1:], found.rows.T @ e.rows[:, :n] / NUISANCE_STEP
+        of_paths = path_gram(e.flight, np.concatenate([own, parameter_rows(e.flight, only)[1:]]), (),
+                             round(SETTLE / e.flight.dt))[1 : len(own), len(own) :]  # fmt: skip
+        return found.gram[1:, 1:], (found.rows.T @ e.rows[:, :n] + of_paths) / NUISANCE_STEP
 
     grams, across = zip(*each(of_record, evidences), strict=True)
     return np.sum(grams, axis=0), np.sum(across, axis=0)

@@ -17,6 +17,7 @@ from icing_env.parameters import UNITS
 from icing_env.record import FlightRecord, FloatArray, RecordMeta
 from sim2real.actuators.paths import driven, follow, full_power
 from sim2real.actuators.surfaces import EXACT
+from sim2real.baseline.loading import of_published
 from sim2real.flown.settling import nearer
 from sim2real.library.candidates import Bank, parameter_rows
 from sim2real.planning.limits import hiding, per_deviation, with_nuisances
@@ -150,14 +151,14 @@ def evidence(flights: Sequence[Reconstruction], candidates: Bank, sigma: float, 
         sigma: gust intensity expected, m/s.
         progress: told what is being done.
     """
-    n = len(candidates.nuisances)
+    n, precision = len(candidates.nuisances), of_published(candidates.nuisances).precision
     moved = np.zeros((candidates.size, n))
     found = []
     for k in range(1 + SETTLING):
         progress(f"flying {candidates.size} variants through {len(flights)} manoeuvres, {1 + k} of {1 + SETTLING}")
         gram = np.sum([_signatures(flight, candidates, sigma, moved) for flight in flights], axis=0)
         found.append(gram)
-        best, left = hiding(gram[1 : 1 + n, 1 : 1 + n], gram[:, 1 : 1 + n], gram, np.eye(n), moved)
+        best, left = hiding(gram[1 : 1 + n, 1 : 1 + n], gram[:, 1 : 1 + n], gram, precision, moved)
         moved = nearer(best, candidates)
         moved[: 1 + n] = 0.0  # the model and the nuisances themselves
     return found[0], left

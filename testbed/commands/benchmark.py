@@ -103,7 +103,8 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
 
         _diagnosis(cases or (STRANGERS if strangers else QUICK if quick else FULL), None if fresh_seed else seed,
                    out / "strangers" if strangers else out, workers, as_json, without=without, rivals=rivals,
-                   ledger=ledger, published=publish, population=Population(strangers, spread, gusts, calibrated=True))
+                   ledger=ledger, published=publish,
+                   population=Population(strangers, spread, gusts, calibrated=True, rigged=True))  # fmt: skip
         return
     if name in ("real_flight", "policies"):
         _cases(name, only, as_json)

@@ -195,8 +195,10 @@ def own_numbers(model: Mapping[str, Mapping[str, float]]) -> list[list[Any]]:
     rows = []
     for name, own in sorted(model.items(), key=lambda item: -abs(item[1]["change"]) / max(item[1]["std_error"], 1e-12)):
         change, error = own["change"], own["std_error"]
-        rows.append([name, f"{change:+.2g} {OFFSETS[name]}", f"{error:.2g} {OFFSETS[name]}"] if name in OFFSETS else
-                    [name, f"{100.0 * change:+.1f} %", f"{100.0 * error:.1f} %"])  # fmt: skip
+        unit = OFFSETS.get(name, "%").removeprefix("1")
+        share, digits = (100.0, ".1f") if unit == "%" else (1.0, ".2g")
+        rows.append([name, *(f"{share * value:{sign}{digits}} {unit}".rstrip()
+                             for value, sign in ((change, "+"), (error, "")))])  # fmt: skip
     return rows
 
 

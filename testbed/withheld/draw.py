@@ -28,6 +28,10 @@ TOLD_ONCE = {"engine_arm_z": 0.5, "CZ_CT": 0.5, "Cm_elevator_CT": 0.5, "Cm_alpha
 # What a calibrated installation is off by, in the channel's unit (assumed)
 CALIBRATION = {"bias_airspeed": 0.1, "bias_alpha": 8e-4, "bias_beta": 8e-4, "bias_phi": 8e-4, "bias_theta": 8e-4,
                "bias_ax": 0.008, "bias_ay": 0.008, "bias_az": 0.01}  # fmt: skip
+# What gyros are off by, what rigging leaves of symmetry, and what surfaces and their readings are off by (assumed)
+RIGGING = {"bias_p": 5e-4, "bias_q": 5e-4, "bias_r": 5e-4, "CY_0": 5e-4, "Cl_0": 2e-4, "Cn_0": 2e-4,
+           "elevator_offset": 1e-3, "aileron_offset": 1e-3, "rudder_offset": 1e-3}  # fmt: skip
+GEARING = {"elevator_gearing": 0.01, "aileron_gearing": 0.01, "rudder_gearing": 0.01}
 SMALLEST, LARGEST = 0.7, 2.2  # of the typical size
 # Effects that must be larger for an ideal observer to name eight of them in 2,400 cases (`shares.py`): the spread of
 # derivatives or a near rival hides smaller ones.
@@ -86,12 +90,14 @@ class Population(NamedTuple):
         gusts: one of `conditions.KINDS`, or "mixed": each in turn.
         calibrated: numbers of which one source or none tells are off as well, and instruments by what a calibration
             leaves: as in every set that is drawn today.
+        rigged: gyros, the airframe's symmetry and surfaces are off as well: as in every set that is drawn today.
     """
 
     strangers: bool = False
     spread: float = SPREAD
     gusts: str = "later"
     calibrated: bool = False
+    rigged: bool = False
 
     def told(self) -> dict[str, Any]:
         """What a manifest says of it: what is not as usual."""
@@ -107,6 +113,9 @@ class Population(NamedTuple):
         rng = np.random.default_rng(np.random.SeedSequence([seed, len(drawn), 5]))
         order = rng.permutation(len(drawn)) % len(KINDS)
         beside = [_about(1.0, TOLD_ONCE, rng) | _about(0.0, CALIBRATION, rng) if self.calibrated else {} for _ in drawn]
+        rng = np.random.default_rng(np.random.SeedSequence([seed, len(drawn), 6]))  # older sets are drawn as they were
+        if self.rigged:
+            beside = [more | _about(0.0, RIGGING, rng) | _about(1.0, GEARING, rng) for more in beside]
         larger = LARGER_STILL if self.calibrated else {}
         return [replace(design, gusts=KINDS[k] if self.gusts == "mixed" else self.gusts,
                         baseline=wider(design.baseline, self.spread) | more,

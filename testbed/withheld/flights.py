@@ -20,7 +20,7 @@ CATALOGUE = {**effects.BY_NAME, **unknown.BY_NAME, **strangers.BY_NAME}
 class Aircraft:
     """What is flown: `baseline` and `parts` (effect, form, size).
 
-    `baseline`: factors by number (spread of derivatives, mass), and what instruments are off by.
+    `baseline`: factors by number (spread of derivatives, mass), and what instruments and what is zero are off by.
     `terms`: what is added to numbers of the airframe and of the instruments beside, by name.
     """
 
@@ -44,6 +44,9 @@ class Aircraft:
                     row[key] *= value / neutral
         for key, factor in self.baseline.items():
             if key in SENSOR_KNOBS:
+                continue
+            if PUBLISHED.get(key) == 0.0:  # an offset
+                row[key] += factor
                 continue
             row[key] *= factor
             if f"{key}_soft" in (DTYPE.names or ()):
