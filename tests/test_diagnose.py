@@ -80,7 +80,7 @@ def test_a_clean_aircraft_is_not_blamed_and_there_is_nothing_to_close():
 
 
 def test_an_effect_left_out_of_the_library_is_not_named():
-    found = diagnose([flown("alpha_bias:offset", 0.009, 3)], without=["alpha_bias"])
+    found = diagnose([flown("alpha_bias:offset", 0.014, 3)], without=["alpha_bias"])
     assert found.verdict != "no_gap"
     assert all("alpha_bias" not in h["effects"] for h in found.hypotheses)
 
@@ -113,14 +113,14 @@ def test_the_answer_has_its_form():
 
 def test_a_record_in_which_the_filter_does_not_settle_is_refused():
     assert SHORTEST > SETTLE
-    record = flown("alpha_bias:offset", 0.009, 3)
+    record = flown("alpha_bias:offset", 0.014, 3)
     with pytest.raises(InputError, match=r"lasts 3 s; at least 5 are needed"):
         diagnose([record.slice(0.0, 3.0)])
     assert diagnose([record.slice(0.0, 5.2)]).verdict in ("no_gap", "explained", "unknown")
 
 
 def test_names_and_notes_of_a_record_change_nothing():
-    record = flown("alpha_bias:offset", 0.009, 3).slice(0.0, 20.0)
+    record = flown("alpha_bias:offset", 0.014, 3).slice(0.0, 20.0)
     lying = replace(record, meta=replace(record.meta, name="mass_error", notes="mass_error 0.2", flight="thrust_loss"))
     honest, told = diagnose([record]), diagnose([lying])
     assert told.verdict == honest.verdict

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from icing_env import effects, scenario
 from icing_env.aircraft import load
+from icing_env.effects.derivatives import OFFSETS
 from icing_env.types import DERIVATIVE_NAMES
 from sim2real.baseline.references import Baseline
 from sim2real.closing.whole_model import changed_places
@@ -46,10 +47,16 @@ def test_an_effect_bends_with_the_regressors_of_the_derivatives_that_it_changes(
                                                    ("rolling_moment", "aileron*aileron*aileron")}
     assert ("yawing_moment", "beta*beta*beta") in bends(effects.get("fin_ice"))
     assert ("yawing_moment", "beta") in bends(effects.get("fin_ice"))  # ice changes derivatives in its own proportions
-    assert not bends(effects.get("alpha_bias")) and not bends(effects.get("pitch_trim"))
+    assert not bends(effects.get("mass_error")) and not bends(effects.get("lateral_cg"))
     for effect in effects.LIBRARY.values():
         assert changes(effect), effect.name
-        assert bool(bends(effect)) <= bool(changes(effect) & {*DERIVATIVE_NAMES, "scale_alpha", "scale_airspeed"})
+        own = changes(effect) & {*DERIVATIVE_NAMES, "scale_alpha", "scale_airspeed", *OFFSETS}
+        assert bool(bends(effect)) <= bool(own), effect.name
+
+
+def test_an_offset_goes_with_time_and_one_of_a_moment_with_speed():
+    assert bends(effects.get("alpha_bias")) == {("sensor:alpha", "time")}
+    assert bends(effects.get("roll_trim")) == {("rolling_moment", "airspeed"), ("rolling_moment", "time")}
 
 
 def test_a_derivative_that_an_effect_changes_alone_has_a_power_among_the_generic_terms():
@@ -232,8 +239,9 @@ def bent() -> tuple[Flying, Bent]:
                            effects={"discrepancy": {"Cm_0": 0.02}})  # fmt: skip
     flight = in_common([reconstruct(fly(chosen, seed=3, observer=False, protection=False).record)])[0]
     with pytest.MonkeyPatch.context() as only:
-        for name in ("CALIBRATION", "TOLD_ONCE"):
+        for name in ("RIGGING", "TOLD_ONCE"):
             only.setattr(library, name, {})
+        only.setattr(library, "INSTRUMENTS", library.SCALES)
         candidates = replace(bank(), families=())
     evidence = gather(flight, candidates)
     baseline = Baseline(load(), np.eye(len(candidates.nuisances)))

@@ -119,7 +119,7 @@ def test_limits_shrink_with_more_manoeuvres(elevator, lateral):
     more = plan(named([ELEVATOR, LATERAL, ELEVATOR]))
     for part in (elevator, lateral):
         assert_no_harder(more, part)
-    assert_easier(more, elevator, "elevator_gearing", "elevator_lag")  # a vane's offset shows beyond its calibration
+    assert_easier(more, elevator, "elevator_lag", "elevator_rate_limit")  # a vane's offset shows beyond its calibration
 
 
 def test_limits_agree_with_those_after_the_flight(elevator):

@@ -51,10 +51,12 @@ def spread_of(numbers: np.ndarray, before: Posterior, then: Posterior) -> float 
     return likeliest(products(numbers), KNOWN, BASELINE, np.zeros(N), before, lambda other: then).spread
 
 
-@pytest.mark.parametrize(("size", "right", "least"), [(1.0, {1.0}, 95), (1.6, {1.5, 2.0}, 80), (2.0, {1.5, 2.0}, 97)])
+@pytest.mark.parametrize(("size", "right", "least"), [
+    (1.0, {1.0}, 285), (1.6, {1.5, 2.0}, 240), (2.0, {1.5, 2.0}, 291),
+])  # fmt: skip
 def test_the_spread_is_that_of_the_numbers(size, right, least):
     rng = np.random.default_rng(0)
-    found = [spread_of(np.where(DERIVATIVES, size, 1.0) * rng.standard_normal(N), told(), told()) for _ in range(100)]
+    found = [spread_of(np.where(DERIVATIVES, size, 1.0) * rng.standard_normal(N), told(), told()) for _ in range(300)]
     assert sum(s in right for s in found) >= least
 
 

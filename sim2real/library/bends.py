@@ -34,10 +34,15 @@ def changes(effect: Effect) -> frozenset[str]:
 def bends(effect: Effect) -> frozenset[tuple[str, str]]:
     """Generic terms (component, name) that are powers of the regressors of the derivatives that an effect changes.
 
-    Or of the reading that it scales: no instrument's calibration is quite a line.
+    Or of the reading that it scales: no instrument's calibration is quite a line. An offset may go with time as far as
+    it goes, one of a moment or force with speed as well.
     """
     if channel := scales(effect):
         return frozenset({(f"sensor:{channel}", f"{channel}*{channel}")})
+    if channel := shifts(effect):
+        return frozenset({(f"sensor:{channel}", "time")})
+    if len(changes(effect)) == 1 and (component := COMPONENTS.get(next(iter(changes(effect))).removesuffix("_0"))):
+        return frozenset({(component, "airspeed"), (component, "time")})
     changed = [name for name in DERIVATIVE_NAMES if name in changes(effect)]
     pairs = [(COMPONENTS[name[:2]], name[3:].rstrip("2")) for name in changed if not name.endswith("_0")]
     powers = (2, 3) if len(pairs) == 1 else (1, 2, 3)

@@ -35,7 +35,7 @@ VANE_SPREAD, PITOT_SPREAD, BOOM_SPREAD = 0.008, 0.05, 1e-4
 # Numbers of which one source or none tells: heights of thrust line and c.g. (0.15 m of 0.3), what the slipstream does
 # to lift and to the elevator (a simulator built on a published set has neither), what part of the pitch damping comes
 # from the delay of the downwash (a quasi-steady set has it in Cm_q), how fast engines spool; assumed
-TOLD_ONCE = {"engine_arm_z": 0.5, "CZ_CT": 0.5, "Cm_elevator_CT": 0.5, "Cm_alphadot": 0.1, "spool_time": 0.15}
+TOLD_ONCE = {"engine_arm_z": 0.5, "CZ_CT": 0.5, "Cm_elevator_CT": 0.5, "Cm_alphadot": 0.1, "spool_time": 0.1}
 SIGNED = ("engine_arm_z", "CZ_CT", "Cm_elevator_CT", "Cn_aileron")  # so uncertain that they may have the other sign
 # Of the readings of flow vanes, upwash included, and of gyros (assumed)
 SCALES = {"scale_alpha": 0.015, "scale_beta": 0.015, "scale_p": 0.005, "scale_q": 0.005, "scale_r": 0.005}
