@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from testbed.withheld import distance, effects
 from testbed.withheld.conditions import Conditions
 from testbed.withheld.distance import Whitener
-from testbed.withheld.draw import CALIBRATION, MASS_RANGE, MOST, SPREAD, TOLD_ONCE
+from testbed.withheld.draw import CALIBRATION, GEARING, MASS_RANGE, MOST, RIGGING, SPREAD, TOLD_ONCE
 from testbed.withheld.flights import Aircraft, Flown, fly
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
 from testbed.withheld.published import DERIVATIVES
@@ -26,7 +26,8 @@ from testbed.withheld.shadow import shadow
 
 MASS_SPREAD = MASS_RANGE / 3**0.5  # of a uniform distribution
 NUISANCES = (*((name, 1.0 + SPREAD) for name in DERIVATIVES if name != "Cn_aileron"), ("mass", 1.0 + MASS_SPREAD),
-             *((name, 1.0 + spread) for name, spread in TOLD_ONCE.items()), *CALIBRATION.items())
+             *((name, 1.0 + spread) for name, spread in (TOLD_ONCE | GEARING).items()),
+             *(CALIBRATION | RIGGING).items())  # fmt: skip
 RIVALS = tuple(effect.name for effect in effects.EFFECTS)
 SIZES = (0.9, 1.8)  # of the typical size, the same sign
 Part = tuple[str, str, float]
