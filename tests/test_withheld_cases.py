@@ -16,6 +16,7 @@ from testbed.withheld.conditions import Conditions
 from testbed.withheld.manoeuvres import PLANS
 from testbed.withheld.published import airframe
 from testbed.withheld.shadow import shadow
+from testbed.withheld.trim import trimmed
 
 NULL = draw.Design("null", (), 0, 1.0, 0.5, 1.3, 1.0, {}, 7)
 
@@ -237,6 +238,13 @@ def test_aircraft_of_a_rigged_set_are_as_before_but_for_rigging():
         name: one[name] for name in ("bias_p", "bias_q", "bias_r")}
     offset = flights.Aircraft(one, (("elevator_offset", "same", 0.01),)).row()["elevator_offset"]
     assert offset == pytest.approx(0.01 + one["elevator_offset"])
+
+
+def test_an_aircraft_whose_ailerons_rest_in_a_dead_zone_is_trimmed():
+    """Rigged a little off it needs aileron, of which the dead zone lets nothing through: no slope led anywhere."""
+    off, part = {"Cl_0": 2e-4, "aileron_offset": 1e-3}, ("aileron_dead_zone", "same", 0.02)
+    free, dead = (trimmed(flights.Aircraft(off, parts).row(), 65.0)[1] for parts in ((), (part,)))
+    assert dead == pytest.approx(free + [0.0, np.copysign(0.02, free[1]), 0.0, 0.0, 0.0], abs=1e-6)
 
 
 def test_a_set_of_another_spread_says_so(tmp_path, only_nulls):

@@ -23,12 +23,22 @@ def trimmed(row: NDArray, speed: float) -> tuple[NDArray, NDArray]:
         ArithmeticError: nothing within 1e-3 (SI) of steady flight was found.
     """
     row["altitude_start"] = ALTITUDE
-    best, z = _newton(row, speed, 0.0)
-    if best > 1e-3 or z[9] > MOST_LEVER:
-        best, z = _newton(row, speed, MOST_LEVER)
+    best, z = _steady(row, speed)
+    if best > 1e-3 and (dead := float(row["aileron_dead"][0])):  # where the ailerons rest in it, it has no slope
+        row["aileron_dead"] = 0.0
+        best, z = _steady(row, speed)
+        row["aileron_dead"], z[7] = dead, z[7] + np.copysign(dead, z[7])
     if best > 1e-3:
         raise ArithmeticError(f"no steady flight at {speed:g} m/s: rates of {best:.2g} are left")
     return _place(row, speed, z)
+
+
+def _steady(row: NDArray, speed: float) -> tuple[float, NDArray]:
+    """The same for the unknowns: level, or at MOST_LEVER."""
+    best, z = _newton(row, speed, 0.0)
+    if best > 1e-3 or z[9] > MOST_LEVER:
+        best, z = _newton(row, speed, MOST_LEVER)
+    return best, z
 
 
 def _newton(row: NDArray, speed: float, lever: float) -> tuple[float, NDArray]:
