@@ -170,7 +170,7 @@ def _at_hand(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord], 
     baseline = of_published(candidates.nuisances)
     if reference:
         progress("fitting the model to the reference flights")
-        baseline = fit_baseline(_reconstructed(reference, None, simulator), candidates)
+        baseline = fit_baseline(_reconstructed(reference, None, simulator), candidates, records)
         if otherwise_loaded(reference, records):
             baseline = of_another_loading(baseline, candidates.nuisances)
         candidates = replace(candidates, nuisances=of_model(candidates.nuisances, baseline.parameters),

@@ -12,7 +12,7 @@ from icing_env import scenario
 from icing_env.aircraft import load
 from icing_env.record import FlightRecord, RecordMeta
 from sim2real.baseline.loading import CENTRE, INERTIA, of_another_loading, of_published, otherwise_loaded
-from sim2real.baseline.references import Baseline, directions, uncertain
+from sim2real.baseline.references import REPEATABLE, Baseline, _baseline, directions, uncertain
 from sim2real.diagnosis import diagnose
 from sim2real.library.candidates import (
     INSTRUMENTS,
@@ -100,6 +100,17 @@ def test_deviations_of_such_numbers_add():
     fitted = shifted(row, directions(bank()), np.array([move.name in SIGNED for move in directions(bank())]), "torque")
     for name in SIGNED:  # of reference flights, in steps of that size
         assert fitted[name][0] - row[name][0] == pytest.approx((WEAK | TOLD_ONCE)[name] * abs(row[name][0]))
+
+
+def test_numbers_are_less_certain_where_references_did_not_fly():
+    """Values are told at the references' condition alone; how they change with it, by the prior of the change."""
+    moves, known, n = directions(bank()), 1e4, len(directions(bank()))
+    at = 0.1
+    precision = known * np.kron([[1.0, at], [at, at**2]], np.eye(n)) + np.diag(np.r_[np.ones(n), 0.25 * np.ones(n)])
+    there, elsewhere = (_baseline(bank(), moves, np.zeros(2 * n), precision, np.array([where])) for where in (at, -0.2))
+    j = [move.name for move in moves].index("Cm_alpha")
+    sd = [np.sqrt(np.linalg.inv(found.precision)[j, j]) for found in (there, elsewhere)]
+    assert sd == pytest.approx([REPEATABLE, np.hypot(REPEATABLE, 0.3 * 2.0)], rel=0.02)
 
 
 def loaded(mass: float | None, inertia: float = 1.0) -> FlightRecord:

@@ -75,7 +75,7 @@ class Baseline:
         """PARAMETERS row at the record's median airspeed."""
         out = self.parameters.copy()
         if self.changes:
-            condition = _condition(float(np.nanmedian(record["airspeed"])))
+            condition = _condition(record)
             for name, slope in self.changes.items():
                 out[name] += condition * slope
         return out
@@ -85,8 +85,13 @@ class Baseline:
         return {**asdict(self.inadequacy), "explained_without_a_gap": {c: v for c, v in self.clean.items() if v > 0.0}}
 
 
-def _condition(airspeed: float) -> float:
-    return (REFERENCE_SPEED / airspeed) ** 2 - 1.0
+def conditions(records: Sequence[FlightRecord]) -> FloatArray:
+    """What numbers go with, beside their values at 65 m/s, at the median airspeed of each record [records]."""
+    return np.array([_condition(record) for record in records])
+
+
+def _condition(record: FlightRecord) -> float:
+    return (REFERENCE_SPEED / float(np.nanmedian(record["airspeed"]))) ** 2 - 1.0
 
 
 def _first(nuisance: Nuisance) -> str:
@@ -116,12 +121,19 @@ def uncertain() -> tuple[Nuisance, ...]:
     return tuple(_beyond(name) for name in BEYOND)
 
 
-def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank) -> Baseline:
-    """The model corrected by reference flights, and the precision with which they leave it."""
-    moves, at = directions(candidates), np.array([_condition(float(np.median(f.channel("airspeed")))) for f in flights])
-    fit = Fit(flights, moves, at)
+def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank, records: Sequence[FlightRecord] = ()
+                 ) -> Baseline:  # fmt: skip
+    """The model corrected by reference flights, and the precision with which they leave it.
+
+    Args:
+        flights: the reference flights.
+        candidates: whose nuisances are corrected.
+        records: flown later, at whose airspeeds the precision is told; the reference flights' if none are given.
+    """
+    at = conditions([flight.record for flight in flights])
+    fit = Fit(flights, directions(candidates), at)
     fit.run()
-    return fit.baseline(candidates)
+    return fit.baseline(candidates, conditions(records) if records else at)
 
 
 class Fit:
@@ -185,9 +197,9 @@ class Fit:
         self.x = self.x + step * LONGEST / max(float(np.max(np.abs(step))), LONGEST)
         return float(np.sqrt(step @ self.precision @ step))
 
-    def baseline(self, candidates: Bank) -> Baseline:
-        """What was fitted, and how well it flies."""
-        found = _baseline(candidates, self.moves, self.x, self.precision, float(np.mean(self.at)))
+    def baseline(self, candidates: Bank, at: FloatArray) -> Baseline:
+        """What was fitted, and how well it flies; its precision on average over the conditions `at`."""
+        found = _baseline(candidates, self.moves, self.x, self.precision, at)
         left = Inadequacy(self.walk, *colour(self.evidences))
         flown = [replace(flight, inadequacy=left) for flight in self.flown()]
         told = clean(flown, [e.gain for e in self.evidences], candidates, found.precision)
@@ -215,16 +227,20 @@ def _normal(evidences: Sequence[Evidence], at: FloatArray) -> tuple[FloatArray, 
 
 
 def _baseline(candidates: Bank, moves: Sequence[Nuisance], x: FloatArray, precision: FloatArray,
-              middle: float) -> Baseline:
-    """The fitted model; its nuisances' precision in their own units, the rest integrated out."""
+              at: FloatArray) -> Baseline:
+    """The fitted model; its nuisances' precision in their own units, the rest integrated out.
+
+    Where references did not fly, the change with speed is told by the prior, and numbers are as uncertain as that.
+    """
     n, count = len(moves), len(candidates.nuisances)
     row, changes = aircraft.load(), dict[str, float]()
     for nuisance, size, change in zip(moves, x[:n], x[n:], strict=True):
         if not nuisance.only:
             nuisance.apply(row, 0, "", float(size))
             changes |= {name: float(change) * nuisance.factor for name in nuisance.parameter.split("+")}
-    both = np.vstack([np.eye(n), middle * np.eye(n)])
-    covariance = (both.T @ np.linalg.inv(precision) @ both)[:count, :count]
+    whole = np.linalg.inv(precision)
+    value, change, across = whole[:n, :n], whole[n:, n:], whole[:n, n:]
+    covariance = (value + np.mean(at) * (across + across.T) + np.mean(at**2) * change)[:count, :count]
     unit = np.ones(count)
     for j, (nuisance, move) in enumerate(zip(candidates.nuisances, moves, strict=False)):
         if not nuisance.absolute:
