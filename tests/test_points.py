@@ -16,7 +16,7 @@ from sim2real.baseline.references import Baseline
 from sim2real.flown.corrections import corrected, lost
 from sim2real.flown.points import Flying
 from sim2real.flown.steps import Point, bounded_step, rooms
-from sim2real.library.candidates import bank
+from sim2real.library.candidates import NUISANCE_STEP, bank
 from sim2real.library.sizes import size_prior
 from sim2real.library.terms import in_common, pushes
 from sim2real.posterior.hypotheses import Hypothesis
@@ -60,6 +60,20 @@ def test_a_point_with_slopes_from_elsewhere_costs_what_it_does_with_its_own(flyi
     assert lent.cost == pytest.approx(own.cost, rel=1e-12)
     assert lent.rows[0][:, 0] == pytest.approx(own.rows[0][:, 0], abs=1e-12)
     assert lent.slopes[0] is flying.near[0]
+
+
+def test_what_commands_and_positions_tell_counts_where_a_set_is_flown(flying):
+    """Nothing of them was told of gearings and offsets there, and the prior drew back what they say."""
+    nothing = np.zeros(len(flying.candidates.nuisances))
+    alone, (beside,) = flying.point(NOTHING, nothing[:0], nothing), flying.points([(NOTHING, nothing[:0], nothing)])
+    gram = flying.evidences[0].gram
+    names = [nuisance.name for nuisance in flying.candidates.nuisances]
+    for j in (names.index("elevator_gearing"), names.index("elevator_offset")):
+        told = gram[1 + j, 1 + j] / NUISANCE_STEP**2
+        assert told > 1.0
+        for at in (alone, beside):
+            assert at.information[j, j] == pytest.approx(1.0 + told, rel=0.02)
+            assert at.slope[j] == pytest.approx(gram[1 + j, 0] / NUISANCE_STEP, abs=0.02 * np.sqrt(told))
 
 
 def test_it_settles_where_full_steps_of_gauss_and_newton_do(flying):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from icing_env import effects
 from icing_env.record import FloatArray
 from sim2real.actuators.lateness import lateness
-from sim2real.actuators.paths import PATHS, excess, path_gram
+from sim2real.actuators.paths import PATHS, excess
 from sim2real.actuators.wandering import wandering
 from sim2real.baseline.references import Baseline
 from sim2real.flown.steps import (
@@ -27,6 +27,7 @@ from sim2real.flown.steps import (
     Slopes,
     descent,
     ends,
+    paths_of,
     promised,
     ranges,
     size_steps,
@@ -179,15 +180,13 @@ class Flying:
         k, n = len(sizes), len(nuisances)
         steps = size_steps(fit, sizes)
         count = 1 + k if slopes else 1 + k + n
-        rows = [rows_of(f, self.candidates, fit, sizes, steps, nuisances)[:count] for f in self.flights]
-        made = self._flown(rows, keep=range(count))
+        rows = [rows_of(f, self.candidates, fit, sizes, steps, nuisances) for f in self.flights]
+        made = self._flown([own[:count] for own in rows], keep=range(count))
         slopes = slopes or self._slopes([own[:, 1 + k :] / NUISANCE_STEP for own in made])
         made = [own[:, : 1 + k].copy() for own in made]  # a view would keep what slopes were made of
 
         def of_record(flight: Reconstruction, own: NDArray, left: FloatArray, lent: Slopes) -> FloatArray:
-            inner = lent.beside(left)
-            inner[: 1 + k, : 1 + k] += path_gram(flight, own[: 1 + k], (), round(SETTLE / flight.dt))
-            return inner
+            return lent.beside(left) + paths_of(flight, own, k)
 
         gram = np.sum(each(of_record, self.flights, rows, made, slopes), axis=0) / self.tempering
         return replace(self._weighed(fit, sizes, nuisances, gram), rows=made, slopes=slopes)
@@ -201,30 +200,25 @@ class Flying:
             return []
         counts = [1 + len(sizes) for _, sizes, _ in sets]
         count = 1 + sum(counts)
-        own = np.zeros((count, count - 1))  # the sets' rows and steps, from those flown and their departures
         at = np.cumsum([1, *counts])
-        for first, after in zip(at, at[1:], strict=False):
-            own[[0, first], first - 1] = 1.0
-            own[np.arange(first + 1, after), np.arange(first, after - 1)] = 1.0
-            own[first, first : after - 1] = -1.0
 
-        def of_record(flight: Reconstruction, rows: NDArray, made: FloatArray, lent: Slopes) -> list[FloatArray]:
-            paths = own.T @ path_gram(flight, rows, (), round(SETTLE / flight.dt)) @ own
+        def of_record(flight: Reconstruction, rows: list[NDArray], made: FloatArray, lent: Slopes) -> list[FloatArray]:
             left = made[:, 1:].copy()  # differences of rows: those of inner products round, where flights depart
             for first, after in zip(at, at[1:], strict=False):
                 left[:, first : after - 1] -= made[:, first : first + 1]
                 left[:, first - 1] += made[:, 0]
             across, found = left.T @ lent.rows, []
-            for first, after in zip(at, at[1:], strict=False):
+            for own, first, after in zip(rows, at, at[1:], strict=False):
                 of_set = slice(first - 1, after - 1)
-                inner = left[:, of_set].T @ left[:, of_set] + paths[of_set, of_set]
-                found.append(np.block([[inner, across[of_set]], [across[of_set].T, lent.inner]]))
+                inner = left[:, of_set].T @ left[:, of_set]
+                found.append(np.block([[inner, across[of_set]], [across[of_set].T, lent.inner]])
+                             + paths_of(flight, own, after - first - 1))
             return found
 
-        rows = [end_to_end([flight.parameters, *(
-            rows_of(flight, self.candidates, fit, sizes, size_steps(fit, sizes), nuisances)[: 1 + len(sizes)]
-            for fit, sizes, nuisances in sets)]) for flight in self.flights]
-        made = self._flown(rows, keep=range(count))
+        rows = [[rows_of(flight, self.candidates, fit, sizes, size_steps(fit, sizes), nuisances)
+                 for fit, sizes, nuisances in sets] for flight in self.flights]
+        made = self._flown([end_to_end([flight.parameters, *(one[:n] for one, n in zip(own, counts, strict=True))])
+                            for flight, own in zip(self.flights, rows, strict=True)], keep=range(count))
         grams = each(of_record, self.flights, rows, made, self.near)
         return [replace(self._weighed(fit, sizes, nuisances, np.sum(parts, axis=0) / self.tempering), slopes=self.near)
                 for (fit, sizes, nuisances), *parts in zip(sets, *grams, strict=True)]
@@ -254,16 +248,15 @@ class Flying:
         first = 1 + k + n
         moved = tuple(replace(term, row=first + j) for j, term in enumerate(terms))
         pushed = self.courses.pushed(point.weights, 1 + k)
-        moved_to = [rows_of(flight, self.candidates, fit, point.sizes, point.steps, point.nuisances)[: 1 + k]
+        moved_to = [rows_of(flight, self.candidates, fit, point.sizes, point.steps, point.nuisances)
                     for flight in self.flights]
-        made = self._flown(moved_to, pushed, range(1 + k)) if point.weights else point.rows
+        made = self._flown([own[: 1 + k] for own in moved_to], pushed, range(1 + k)) if point.weights else point.rows
 
         def of_record(flight: Reconstruction, rows: NDArray, own: FloatArray, slopes: Slopes,
                       of_terms: tuple[FloatArray, FloatArray]) -> FloatArray:
             across = np.concatenate([own.T @ of_terms[0], slopes.onto])
-            rows = np.take(rows, [*range(1 + k), *[0] * (n + len(terms))])
-            return np.block([[slopes.beside(own), across], [across.T, of_terms[1]]]) + path_gram(
-                flight, rows, moved, round(SETTLE / flight.dt))
+            rows = np.take(rows, [*range(first), *[0] * len(terms)])
+            return np.block([[slopes.beside(own), across], [across.T, of_terms[1]]]) + paths_of(flight, rows, k, moved)
 
         gram = np.sum(each(of_record, self.flights, moved_to, made, point.slopes, self.courses.of_terms()),
                       axis=0) / self.tempering

@@ -11,9 +11,13 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from icing_env.record import FloatArray
+from sim2real.actuators.paths import path_gram
 from sim2real.library.candidates import NUISANCE_STEP
+from sim2real.library.terms import Term
 from sim2real.posterior.hypotheses import Settled
 from sim2real.posterior.sets import SetFit
+from sim2real.records.reconstruct import Reconstruction
+from sim2real.signatures.whitening import SETTLE
 
 ROUNDS, PATIENCE = 10, 2  # steps with the same slopes by nuisances, and those of them that need not help
 SHORTEST = 0.25  # share of a step that is tried before slopes by nuisances are flown anew
@@ -201,3 +205,16 @@ def size_steps(fit: SetFit, sizes: FloatArray) -> FloatArray:
         step = min(max(SIZE_STEP * spread, 1e-4 * (high - low)), 0.1 * (high - low))
         out[m] = step if size + step <= high else -step
     return out
+
+
+def paths_of(flight: Reconstruction, rows: NDArray, k: int, terms: Sequence[Term] = ()) -> FloatArray:
+    """Inner products of what the paths of a record leave, of a step of each size and of a nuisance's deviation.
+
+    Args:
+        rows: of `rows_of`, and one for each of the terms.
+        k: how many sizes there are.
+        terms: as `path_gram` has them.
+    """
+    unit = np.ones(len(rows))
+    unit[1 + k : len(rows) - len(terms)] = 1.0 / NUISANCE_STEP
+    return path_gram(flight, rows, terms, round(SETTLE / flight.dt)) * unit[:, None] * unit
