@@ -88,6 +88,16 @@ def test_derivatives_and_lines_are_flown_too(key):
         assert found["effects_after"] == pytest.approx(key["held_out"]["oracle"])
 
 
+def test_an_offset_of_the_aircrafts_own_is_no_share_of_what_is_published():
+    """Published as nothing, a rolling moment of 2e-4 was flown as one of 1.0002."""
+    found = refly.told(answer("derivatives", Cl_0=2e-4, aileron_offset=-1e-3, bias_q=4e-4, aileron_gearing=0.01))
+    assert found.factors == pytest.approx({"Cl_0": 2e-4, "aileron_offset": -1e-3, "bias_q": 4e-4,
+                                           "aileron_gearing": 1.01})  # fmt: skip
+    row, plain = (Aircraft(factors).row() for factors in (found.factors, {}))
+    assert row["Cl_0"][0] == pytest.approx(2e-4) and row["aileron_offset"][0] == pytest.approx(-1e-3)
+    assert row["aileron_gearing"][0] == pytest.approx(1.01 * plain["aileron_gearing"][0])
+
+
 def test_terms_about_a_condition_are_those_of_the_library():
     """What the generator adds to its numbers is what `discrepancy` adds to the simulator's, but for what it lacks."""
     from icing_env.aircraft import load

@@ -27,7 +27,7 @@ from testbed.withheld.effects import BY_NAME
 from testbed.withheld.files import read_json, write_text
 from testbed.withheld.flights import Aircraft, recorded
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
-from testbed.withheld.published import DERIVATIVES, SENSOR_KNOBS
+from testbed.withheld.published import DERIVATIVES, PUBLISHED, SENSOR_KNOBS
 from testbed.withheld.windows import gap_of, held
 from testbed.workers import a_core_each, processes
 
@@ -134,7 +134,7 @@ def told(answer: dict[str, Any]) -> Told:
     lacking = list[str]()
     for name, values in _effects(command_of(answer)):
         if name == "derivatives":
-            factors |= {key: value if key in SENSOR_KNOBS else 1.0 + value for key, value in values.items()}
+            factors |= {key: value if offset(key) else 1.0 + value for key, value in values.items()}
         elif name == "discrepancy":
             more, missing = numbers(values)
             terms |= more
@@ -147,6 +147,11 @@ def told(answer: dict[str, Any]) -> Told:
                 else:
                     lacking.append(full)
     return Told(tuple(parts), factors, terms, tuple(lacking))
+
+
+def offset(name: str) -> bool:
+    """Whether a number of the aircraft's own is an offset, no part of what is published."""
+    return name in SENSOR_KNOBS or PUBLISHED.get(name) == 0.0
 
 
 def _effects(command: str) -> list[tuple[str, dict[str, float]]]:
