@@ -45,7 +45,7 @@ class Aircraft:
         for key, factor in self.baseline.items():
             if key in SENSOR_KNOBS:
                 continue
-            if PUBLISHED.get(key) == 0.0:  # an offset
+            if offset(key):
                 row[key] += factor
                 continue
             row[key] *= factor
@@ -66,6 +66,11 @@ class Aircraft:
             for key in set(own) & set(SENSOR_KNOBS):
                 wrong[key] = wrong.get(key, 0.0) + own[key]
         return wrong
+
+
+def offset(name: str) -> bool:
+    """Whether a number of the aircraft's own is an offset, no part of what is published."""
+    return name in SENSOR_KNOBS or PUBLISHED.get(name) == 0.0
 
 
 @dataclass(frozen=True)

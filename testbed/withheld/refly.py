@@ -25,9 +25,9 @@ from testbed.withheld.distance import MOTION
 from testbed.withheld.draw import Design
 from testbed.withheld.effects import BY_NAME
 from testbed.withheld.files import read_json, write_text
-from testbed.withheld.flights import Aircraft, recorded
+from testbed.withheld.flights import Aircraft, offset, recorded
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
-from testbed.withheld.published import DERIVATIVES, PUBLISHED, SENSOR_KNOBS
+from testbed.withheld.published import DERIVATIVES, SENSOR_KNOBS
 from testbed.withheld.windows import gap_of, held
 from testbed.workers import a_core_each, processes
 
@@ -147,11 +147,6 @@ def told(answer: dict[str, Any]) -> Told:
                 else:
                     lacking.append(full)
     return Told(tuple(parts), factors, terms, tuple(lacking))
-
-
-def offset(name: str) -> bool:
-    """Whether a number of the aircraft's own is an offset, no part of what is published."""
-    return name in SENSOR_KNOBS or PUBLISHED.get(name) == 0.0
 
 
 def _effects(command: str) -> list[tuple[str, dict[str, float]]]:
