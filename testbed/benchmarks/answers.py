@@ -90,11 +90,14 @@ def solve_by_role(case: Path) -> dict[str, Any]:
         of = {role: [r for r in records if r.meta.role == role] for role in ("diagnose", "held_out", "reference")}
         return diagnosis_of(of["diagnose"], of["held_out"], of["reference"])
 
-    return answered(work)
+    return answered(work, case)
 
 
-def answered(work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+def answered(work: Callable[[], dict[str, Any]], case: Path) -> dict[str, Any]:
     """One case's answer; where a record is refused or `work` fails, why: it must not cost other cases their answers.
+
+    Args:
+        case: the folder of its records, which the answer does not name: it may be published, from any machine.
 
     Raises:
         ImportError: the installation lacks something, which says nothing of the case.
@@ -104,6 +107,7 @@ def answered(work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
     except ImportError:
         raise
     except InputError as error:
-        return {"error": str(error)}
+        why = str(error)
     except Exception as error:
-        return {"error": f"{type(error).__name__}: {error}"}
+        why = f"{type(error).__name__}: {error}"
+    return {"error": why.replace(f"{case}/", "")}

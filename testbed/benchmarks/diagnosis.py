@@ -148,7 +148,7 @@ def solve(case: Path, without: tuple[str, ...] = ()) -> dict[str, Any]:
         records = [read(path) for path in sorted(case.glob("*.csv"))]
         return diagnosis_of(records[:DIAGNOSED], records[DIAGNOSED:], without=without)
 
-    return answered(work)
+    return answered(work, case)
 
 
 def solve_by(case: Path, rival: str) -> dict[str, Any]:
@@ -156,7 +156,7 @@ def solve_by(case: Path, rival: str) -> dict[str, Any]:
     from icing_env.record import read
     from testbed.rivals.solve import diagnose
 
-    return answered(lambda: diagnose(rival, [read(path) for path in sorted(case.glob("*.csv"))[:DIAGNOSED]]))
+    return answered(lambda: diagnose(rival, [read(path) for path in sorted(case.glob("*.csv"))[:DIAGNOSED]]), case)
 
 
 def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[str]]]]:

@@ -84,7 +84,7 @@ def solve(case: Path, recorder: str) -> dict[str, Any]:
         records = [read(path) for path in sorted(case.glob("*.csv"))[:DIAGNOSED]]
         return diagnosis_of([replace(r, channels=RECORDERS[recorder](dict(r.channels), rng)) for r in records])
 
-    return answered(work)
+    return answered(work, case)
 
 
 def tables(found: list[dict[str, Any]]) -> list[tuple[str, dict[str, str], list[list[str]]]]:
