@@ -11,8 +11,6 @@ from hypothesis import strategies as st
 
 from icing_env import effects, scenario
 from icing_env.aircraft import load
-from icing_env.effects.derivatives import OFFSETS
-from icing_env.types import DERIVATIVE_NAMES
 from sim2real.baseline.references import Baseline
 from sim2real.closing.whole_model import changed_places
 from sim2real.flown import other_form as in_form
@@ -20,9 +18,8 @@ from sim2real.flown.other_form import Bent, bring, flown_unknown
 from sim2real.flown.points import Flying
 from sim2real.flown.steps import FARTHEST, bounded_step
 from sim2real.library import candidates as library
-from sim2real.library.bends import bends, changes
 from sim2real.library.candidates import bank
-from sim2real.library.terms import BEYOND, GENERIC, GENERIC_SIZE, Term, in_common, pushes, values_of
+from sim2real.library.terms import GENERIC_SIZE, Term, in_common, pushes, values_of
 from sim2real.posterior.form import Form, home
 from sim2real.posterior.generic import fit_unknown
 from sim2real.posterior.home_terms import gain
@@ -40,33 +37,6 @@ def products(seed: int, terms: int, left: float) -> np.ndarray:
     whole = np.column_stack([left * rng.standard_normal(300) / 10.0, 3.0 * rng.standard_normal((300, terms))])
     whole[:, 0] += whole[:, 1:] @ rng.standard_normal(terms)
     return whole.T @ whole
-
-
-def test_an_effect_bends_with_the_regressors_of_the_derivatives_that_it_changes():
-    assert bends(effects.get("aileron_power")) == {("rolling_moment", "aileron*aileron"),
-                                                   ("rolling_moment", "aileron*aileron*aileron")}
-    assert ("yawing_moment", "beta*beta*beta") in bends(effects.get("fin_ice"))
-    assert ("yawing_moment", "beta") in bends(effects.get("fin_ice"))  # ice changes derivatives in its own proportions
-    assert not bends(effects.get("mass_error")) and not bends(effects.get("lateral_cg"))
-    for effect in effects.LIBRARY.values():
-        assert changes(effect), effect.name
-        own = changes(effect) & {*DERIVATIVE_NAMES, "scale_alpha", "scale_airspeed", *OFFSETS}
-        assert bool(bends(effect)) <= bool(own), effect.name
-
-
-def test_an_offset_goes_with_time_and_one_of_a_moment_with_speed():
-    assert bends(effects.get("alpha_bias")) == {("sensor:alpha", "time")}
-    assert bends(effects.get("roll_trim")) == {("rolling_moment", "airspeed"), ("rolling_moment", "time")}
-
-
-def test_a_derivative_that_an_effect_changes_alone_has_a_power_among_the_generic_terms():
-    known = {(component, name) for component, _, names in (*GENERIC, *BEYOND) for name in names}
-    for effect in effects.LIBRARY.values():
-        if len(changes(effect) & set(DERIVATIVE_NAMES)) == 1 and bends(effect):
-            assert bends(effect) & known, effect.name
-    # nothing is symmetric about the elevator's trim, so that its square bends as well as its cube
-    cubed = {("pitching_moment", f"elevator{'*elevator' * times}") for times in (1, 2)}
-    assert cubed <= bends(effects.get("elevator_power")) & known
 
 
 @given(st.integers(0, 200), st.floats(0.0, 30.0), st.sampled_from([None, (True, False, False, False),

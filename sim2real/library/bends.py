@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from icing_env import aircraft
 from icing_env.effects import Effect, Parameter
 from icing_env.types import DERIVATIVE_NAMES
+from sim2real.library.terms import WANDERING
 
 ALWAYS = {"1", "time"}
 COMMON = {*ALWAYS, "airspeed", "alpha", "CT"}  # what any force or moment may be a function of
+THRUST = ("thrust_factor_left", "thrust_factor_right")
 COMPONENTS = {"CX": "x_force", "CY": "y_force", "CZ": "z_force", "Cl": "rolling_moment", "Cm": "pitching_moment",
               "Cn": "yawing_moment"}  # fmt: skip
 
@@ -35,18 +37,35 @@ def bends(effect: Effect) -> frozenset[tuple[str, str]]:
     """Generic terms (component, name) that are powers of the regressors of the derivatives that an effect changes.
 
     Or of the reading that it scales: no instrument's calibration is quite a line. An offset may go with time as far as
-    it goes, one of a moment or force with speed as well.
+    it goes, one of a moment or force with speed as well. Thrust goes with speed; of two engines that are not alike it
+    may be one alone that is not as published.
     """
     if channel := scales(effect):
         return frozenset({(f"sensor:{channel}", f"{channel}*{channel}")})
     if channel := shifts(effect):
-        return frozenset({(f"sensor:{channel}", "time")})
+        return frozenset((f"sensor:{channel}", term) for term in ("time", *WANDERING))
+    if changes(effect) and changes(effect) <= set(THRUST):
+        return frozenset(("propulsion", term) for term in _of_thrust(effect))
     if len(changes(effect)) == 1 and (component := COMPONENTS.get(next(iter(changes(effect))).removesuffix("_0"))):
         return frozenset({(component, "airspeed"), (component, "time")})
     changed = [name for name in DERIVATIVE_NAMES if name in changes(effect)]
     pairs = [(COMPONENTS[name[:2]], name[3:].rstrip("2")) for name in changed if not name.endswith("_0")]
     powers = (2, 3) if len(pairs) == 1 else (1, 2, 3)
     return frozenset((component, "*".join([by] * power)) for component, by in pairs for power in powers)
+
+
+def _of_thrust(effect: Effect) -> list[str]:
+    """Terms of thrust that another form of an effect on it may have."""
+    both = ["both*airspeed", "both*airspeed*airspeed"]
+    return both if _of_both_engines(effect) else ["both", *both, "left", "left*airspeed", "left*airspeed*airspeed"]
+
+
+@cache
+def _of_both_engines(effect: Effect) -> bool:
+    """Whether an effect changes the thrust of both engines alike, and nothing else."""
+    row = plain().copy()
+    effect.apply(row, effect.neutral() | {p.name: some(p) for p in effect.parameters})
+    return changes(effect) == set(THRUST) and bool(np.all(row[THRUST[0]] == row[THRUST[1]]))
 
 
 @cache
@@ -112,12 +131,15 @@ def natural(effect: Effect, component: str, term: str) -> bool:
     Where an effect changes derivatives alone, its form is a function of their regressors, of speed, flow and power; a
     rudder's moment is no form of ice on a wing, though both yaw. A constant is what is left of any function, so that
     an effect that changes nothing else may have any form. An instrument's scale is a function of its own reading, its
-    bias of time at most; an error of airspeed with the angle of attack is neither. Other effects may have any form.
+    bias of time at most; an error of airspeed with the angle of attack is neither. What one engine does is no form of
+    what both do alike. Other effects may have any form.
     """
     if (channel := scales(effect)) and component == f"sensor:{channel}":
         return set(term.split("*")) <= {"1", "time", channel}
     if (channel := shifts(effect)) and component == f"sensor:{channel}":
-        return term in ("1", "time")
+        return set(term.split("*")) <= ALWAYS
+    if _of_both_engines(effect) and component == "propulsion":
+        return not term.startswith("left")
     if not (own := _regressors(effect, component)):
         return True
     own |= COMMON

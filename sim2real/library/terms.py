@@ -9,6 +9,7 @@ from itertools import product
 
 import numpy as np
 from scipy.signal import bilinear, lfilter
+from scipy.special import eval_legendre
 
 from icing_env.atmosphere import density
 from icing_env.crosstalk import CROSSTALK
@@ -66,15 +67,19 @@ GENERIC: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 # Structural modes under an accelerometer: what rings at so many Hz, in phase and a quarter behind. Light transports
 # have their first bending modes there (assumed), and each covers its neighbourhood.
 MODES = tuple(f"{kind}:{hertz:g}" for hertz in (2.0, 3.0, 4.5) for kind in ("rings", "rings_late"))
+# What the zero of an instrument may do beside drifting evenly: Legendre polynomials of time, of degree two and three.
+WANDERING = ("time*time", "time*time*time")
 # Terms that the effect `discrepancy` cannot fly, and that show where a gap lies nevertheless: of sensors, with thrust
 # or with a memory; of the paths of surfaces, with the memory of an actuator of second order (no lags: actuators have
 # their own, and channels are in step to a few ms at best); in the engines and of the wind.
 BEYOND: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+    *((f"sensor:{c}", c, WANDERING) for c in MEASURED[:12]),
     *((f"sensor:{c}", c, ("CT",)) for c in ("airspeed", "alpha", "beta")),
     ("sensor:phi", "phi", ("slow_phi", "slow_ay")), ("sensor:theta", "theta", ("slow_theta", "slow_ax")),
     ("sensor:ay", "ay", MODES), ("sensor:az", "az", MODES),
     *((f"{s}_path", f"{s}_path", ("acceleration", "inertia")) for s in SURFACES),
-    ("propulsion", "thrust", ("both", "both*airspeed", "left", "left*airspeed")),
+    ("propulsion", "thrust", ("both", "both*airspeed", "both*airspeed*airspeed", "left", "left*airspeed",
+                              "left*airspeed*airspeed")),
     ("wind", "wind", ("along*time", "across*time")),
 )  # fmt: skip
 # One standard deviation of a generic coefficient with a time course of unit size (assumed: a quarter of the change
@@ -134,17 +139,21 @@ def at_any_time(flight: Reconstruction, component: str, first: int) -> list[Term
 
 
 def _thrust_pushes(flight: Reconstruction, term: Term) -> list[Push]:
-    """A share of both engines' thrust or of the left one's: felt, and read where recorded."""
+    """A share of both engines' thrust or of the left one's: felt, slipstream included, and read where recorded."""
     side, _, course = term.name.partition("*")
     p, sides = flight.parameters[0], ("left", "right") if side == "both" else ("left",)
     per_power = thrust_per_power(p, flight.channel("airspeed"), flight.channel("alpha"))
+    xx, zz, xz = p["inertia_xx"], p["inertia_zz"], p["inertia_xz"]
+    pitch = p["Cm_CT"] + p["Cm_elevator"] * p["Cm_elevator_CT"] * flight.controls["elevator"]  # per CT, as CZ_CT is
     out = []
     for side in sides:
         thrust = flight.controls[f"power_{side}"] * per_power
         series = THRUST_SIZE * thrust * _course(flight, course or "1")
-        yaw = p["engine_arm_y"] / p["inertia_zz"] * (1.0 if side == "left" else -1.0)
-        out += [Push(term.row, "u", series / p["mass"], False), Push(term.row, "r", yaw * series, False),
-                Push(term.row, "q", p["engine_arm_z"] / p["inertia_yy"] * series, False),
+        turn = p["engine_arm_y"] / (xx * zz - xz**2) * (1.0 if side == "left" else -1.0) * series
+        out += [Push(term.row, "u", series / p["mass"], False), Push(term.row, "r", xx * turn, False),
+                Push(term.row, "p", xz * turn, False),
+                Push(term.row, "w", p["CZ_CT"] / p["mass"] * series, False),
+                Push(term.row, "q", (p["engine_arm_z"] + p["chord"] * pitch) / p["inertia_yy"] * series, False),
                 Push(term.row, f"thrust_{side}", series, True)]
     return out
 
@@ -189,7 +198,7 @@ def in_common(flights: Sequence[Reconstruction]) -> list[Reconstruction]:
 
 
 def _course(flight: Reconstruction, name: str, aerodynamic: bool = False) -> FloatArray:
-    """Product of the deviations named, in units of DEVIATION; a ramp from -1 to 1 for time, or a hat about a knot.
+    """Product of the deviations named, in units of DEVIATION; of time a polynomial from -1 or 1 to 1, or a knot's hat.
 
     Args:
         aerodynamic: what the air does with a rate of turn goes with the rate over the airspeed.
@@ -197,8 +206,8 @@ def _course(flight: Reconstruction, name: str, aerodynamic: bool = False) -> Flo
     n = len(flight.time)
     if name == "1":
         return np.ones(n)
-    if name == "time":
-        return np.linspace(-1.0, 1.0, n)
+    if set(name.split("*")) == {"time"}:
+        return np.asarray(eval_legendre(name.count("time"), np.linspace(-1.0, 1.0, n)))
     if name.startswith(KNOT_AT):
         return hat(flight, float(name.removeprefix(KNOT_AT)))
     out = np.ones(n)

@@ -38,7 +38,7 @@ def _unit(term: str, component: str) -> float:
     if component == WIND:
         return WIND_SIZE if term.endswith("time") else WIND_CHANGE
     if component == "propulsion":
-        return THRUST_SIZE / (DEVIATION["airspeed"] if term.endswith("*airspeed") else 1.0)
+        return float(THRUST_SIZE / DEVIATION["airspeed"] ** term.count("airspeed"))
     target = next(target for where, target, _ in GENERIC if where == component)
     if component.startswith("sensor:"):
         if term.startswith("rings") or (term not in ("1", "time") and term.removesuffix("_dot") == target):
