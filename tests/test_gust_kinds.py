@@ -107,17 +107,25 @@ def test_of_a_gap_that_no_gusts_make_sense_of_a_first_guess_tells_their_kind(see
     assert likeliest_guess(ways, candidates, baseline, ()).kind == kind
 
 
-@pytest.mark.parametrize(("kind", "sigma", "ahead", "taken"), [
-    (KINDS[2], 1.5, 0.2, False), (KINDS[2], 1.5, 0.4, True), (KINDS[2], SIGMAS[-1], 9.0, False),
-    (KINDS[1], 1.5, 9.0, False), (KINDS[1], 1.5, 19.0, True), (LATER, SIGMAS[-1], 0.1, True),
+@pytest.mark.parametrize(("kind", "sigma", "ahead", "before", "gap", "taken"), [
+    (KINDS[2], 1.5, 0.2, 0.0, True, False), (KINDS[2], 1.5, 0.4, 0.0, True, True),
+    (KINDS[2], 1.5, 0.2, 0.1, True, True), (KINDS[2], 1.5, 0.1, 0.1, True, False),
+    (KINDS[2], 1.5, 0.1, 0.0, False, True), (KINDS[2], 1.5, -0.1, 0.1, False, False),
+    (KINDS[2], SIGMAS[-1], 9.0, 0.0, True, False), (KINDS[1], 1.5, 9.0, 9.0, True, False),
+    (KINDS[1], 1.5, 19.0, 0.0, True, True), (LATER, SIGMAS[-1], 0.1, 0.0, True, True),
 ])
-def test_what_a_guess_in_other_gusts_has_to_gain(monkeypatch, kind, sigma, ahead, taken):
-    """Air that turns all that is asked of it; where only the strongest gusts make sense even so, none is enough."""
+def test_what_a_guess_in_other_gusts_has_to_gain(monkeypatch, kind, sigma, ahead, before, gap, taken):
+    """Air that turns all that is asked of it; where only the strongest gusts make sense even so, none is enough.
+
+    Less where it is likelier without the gap (`before`), too, and nothing where it needs none.
+    """
     flight = reconstruct(flown(5, 0.5))
     first, second = (Followed([flight], np.zeros(1), gains(flight, (s,), k)) for s, k in ((1.5, LATER), (sigma, kind)))
     likely = {id(first.known): 50.0, id(second.known): 50.0 + ahead}
     monkeypatch.setattr(first_guess, "likelihood", lambda _, known: likely[id(known)])
-    monkeypatch.setattr(first_guess, "first_guess", lambda way, *_: Guess(way, way.flights, way.known))
+    monkeypatch.setattr(first_guess, "first_guess",
+                        lambda way, *_: Guess(way, way.flights, way.known, way is first or gap))
+    monkeypatch.setattr(Followed, "likelihood", lambda way, _: before if way is second else 0.0)
     guess = first_guess.likeliest_guess([first, second], bank(), Baseline(load(), np.eye(1)), ())
     assert (guess.begun is second) == taken
 

@@ -36,11 +36,15 @@ PLAIN, GUESSES = 20.0, 4  # log evidence by which an effect is plain to see, and
 
 
 class Guess(NamedTuple):
-    """Where the model settled, the records about it with what is plain to see in it, and their gains with that."""
+    """Where the model settled, the records about it with what is plain to see in it, and their gains with that.
+
+    gap: whether an effect is plain to see.
+    """
 
     begun: Followed
     flights: list[Reconstruction]
     gains: list[Gain]
+    gap: bool
 
     @property
     def kind(self) -> Kind:
@@ -57,14 +61,19 @@ def likeliest_guess(ways: Sequence[Followed], candidates: Bank, baseline: Baseli
 
     What a gap makes of a model that has none passes for a kind of gusts; with the gap in it, the likelihood tells. It
     has to gain a little by gusts of another kind than those of the first guess, by air that turns what is asked of it:
-    that passes for what another form of a gap in roll leaves, too. Where only the strongest make sense even so, what is
-    not understood passes for gusts, and nothing is in favour of another kind.
+    that passes for what another form of a gap in roll leaves, too; else half as much where it is likelier without the
+    gap as well, and nothing where there is no gap in it and one in the first guess. Where only the strongest make sense
+    even so, what is not understood passes for gusts, and nothing is in favour of another kind.
     """
     best, *others = [first_guess(way, candidates, baseline, untestable) for way in ways]
     for other in others:
         needed = 0.0 if other.kind == best.kind else TURNING[0] * len(other.gains)
         if other.kind.rotation and not best.kind.rotation:
             needed = sum(asked(gain) for gain in other.gains)
+        elif other.begun.likelihood(candidates) > best.begun.likelihood(candidates):
+            needed *= 0.5
+        if best.gap and not other.gap:
+            needed = 0.0
         sense = other.kind == best.kind or not strongest(other.gains)
         if sense and other.likelihood() > best.likelihood() + needed:
             best = other
@@ -77,7 +86,7 @@ def first_guess(begun: Followed, candidates: Bank, baseline: Baseline, untestabl
     A gap passes for gust. What all variants would have to be flown again for is seen with a few of them.
     """
     flights, centre, known = begun
-    alone = Guess(begun, about(flights, candidates, centre), known)
+    alone = Guess(begun, about(flights, candidates, centre), known, False)
     few = at_few_sizes(candidates, untestable)
     evidences = gather_about(flights, few, centre, known)
     gram = with_prior(total(evidences), few, baseline.precision, centre)
@@ -100,4 +109,4 @@ def first_guess(begun: Followed, candidates: Bank, baseline: Baseline, untestabl
     found = gains_with(flying, guess, point.nuisances, 1)
     if departs(model_alone(flights, few, centre, found)):
         return alone
-    return Guess(begun, [explained(flight, few, guess, point.nuisances) for flight in flights], found)
+    return Guess(begun, [explained(flight, few, guess, point.nuisances) for flight in flights], found, True)

@@ -117,8 +117,8 @@ def followed_in_any(flights: Sequence[Reconstruction], candidates: Bank, baselin
     Settled in gusts of another kind, often several times as strong as they were, derivatives go as far as they may, and
     terms of a wrong explanation would tell which kind turns the air; settled in each, the model says it by itself. A
     gap may look like that, too. In both is settled what a first guess has to decide: where numbers of rolling or yawing
-    moments go as far as they may in air that turns, and where only the strongest gusts make sense, in which the tail
-    meets them later or not. The latter is not asked of an aircraft that the model follows poorly.
+    moments go as far as they may in air that turns, and where any number does, or only the strongest gusts make sense,
+    in which the tail meets them later or not. The latter is not asked of an aircraft that the model follows poorly.
     """
     found = followed(flights, candidates, baseline, kind)
     if not kind.rotation and turns(about(found.flights, candidates, found.centre), found.known):
@@ -128,7 +128,8 @@ def followed_in_any(flights: Sequence[Reconstruction], candidates: Bank, baselin
         believed = likely is found or np.max(np.abs(likely.centre[rolls])) < MOVED
         return [likely] if believed else [found, likely]
     told = all(flight.inadequacy.followed for flight in found.flights)
-    others = STRAIGHT if told and strongest(found.known) else ()
+    doubtful = strongest(found.known) or bool(np.max(np.abs(found.centre)) >= MOVED)
+    others = STRAIGHT if told and doubtful else ()
     return [found, *(followed(flights, candidates, baseline, other) for other in others if other != kind)]
 
 
