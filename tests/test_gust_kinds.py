@@ -11,7 +11,7 @@ from icing_env.aircraft import load
 from icing_env.record import FlightRecord
 from sim2real.baseline.references import Baseline
 from sim2real.diagnosis import diagnose
-from sim2real.flown import first_guess
+from sim2real.flown import first_guess, settling
 from sim2real.flown.first_guess import Guess, likeliest_guess
 from sim2real.flown.settling import Followed, followed_in_any, likeliest_explained
 from sim2real.library.candidates import bank
@@ -128,6 +128,18 @@ def test_what_a_guess_in_other_gusts_has_to_gain(monkeypatch, kind, sigma, ahead
     monkeypatch.setattr(Followed, "likelihood", lambda way, _: before if way is second else 0.0)
     guess = first_guess.likeliest_guess([first, second], bank(), Baseline(load(), np.eye(1)), ())
     assert (guess.begun is second) == taken
+
+
+@pytest.mark.parametrize(("farthest", "kinds"), [(0.97, [LATER]), (1.0, [LATER, KINDS[2]])])
+def test_of_a_model_that_goes_as_far_as_it_may_both_straight_kinds_are_asked(monkeypatch, farthest, kinds):
+    """Elevators that are rigged off pass for gusts that the tail meets later, as far as numbers go."""
+    flight, candidates = reconstruct(flown(5, 0.5)), bank()
+    centre = np.zeros(len(candidates.nuisances))
+    centre[3] = -farthest * settling.MOVED
+    monkeypatch.setattr(settling, "followed", lambda flights, *given: Followed(flights, centre, gains(
+        flights[0], (0.5,), given[2])))
+    ways = followed_in_any([flight], candidates, Baseline(load(), np.eye(len(centre))), LATER)
+    assert [way.kind for way in ways] == kinds
 
 
 def test_of_an_aircraft_that_the_model_follows_poorly_no_kind_of_gusts_is_asked():
