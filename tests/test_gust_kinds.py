@@ -111,7 +111,8 @@ def test_of_a_gap_that_no_gusts_make_sense_of_a_first_guess_tells_their_kind(see
     (KINDS[2], 1.5, 0.2, 0.0, True, False), (KINDS[2], 1.5, 0.4, 0.0, True, True),
     (KINDS[2], 1.5, 0.2, 0.1, True, True), (KINDS[2], 1.5, 0.1, 0.1, True, False),
     (KINDS[2], 1.5, 0.1, 0.0, False, True), (KINDS[2], 1.5, -0.1, 0.1, False, False),
-    (KINDS[2], SIGMAS[-1], 9.0, 0.0, True, False), (KINDS[1], 1.5, 9.0, 9.0, True, False),
+    (KINDS[2], SIGMAS[-1], 9.0, 0.0, True, False),
+    (KINDS[1], 1.5, 9.0, 9.0, True, False), (KINDS[1], 1.5, 9.0, 9.0, False, False),
     (KINDS[1], 1.5, 19.0, 0.0, True, True), (LATER, SIGMAS[-1], 0.1, 0.0, True, True),
 ])
 def test_what_a_guess_in_other_gusts_has_to_gain(monkeypatch, kind, sigma, ahead, before, gap, taken):

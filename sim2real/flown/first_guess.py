@@ -70,10 +70,10 @@ def likeliest_guess(ways: Sequence[Followed], candidates: Bank, baseline: Baseli
         needed = 0.0 if other.kind == best.kind else TURNING[0] * len(other.gains)
         if other.kind.rotation and not best.kind.rotation:
             needed = sum(asked(gain) for gain in other.gains)
+        elif best.gap and not other.gap:
+            needed = 0.0
         elif other.begun.likelihood(candidates) > best.begun.likelihood(candidates):
             needed *= 0.5
-        if best.gap and not other.gap:
-            needed = 0.0
         sense = other.kind == best.kind or not strongest(other.gains)
         if sense and other.likelihood() > best.likelihood() + needed:
             best = other
