@@ -85,7 +85,7 @@ def test_terms_of_thrust_act_as_engines_do(flight):
         assert taken == pytest.approx(gram[row, row], rel=5e-5), name
 
 
-def test_a_thrust_of_speed_squared_is_two_terms_of_speed(flight):
+def test_a_thrust_that_goes_with_speed_squared_is_made_of_terms_of_speed(flight):
     """Of thrust that goes with the square of speed nothing is left beside the constant, the linear and the square."""
     names = ("both", "both*airspeed", "both*airspeed*airspeed")
     found = pushes(flight, [Term("propulsion", name, "thrust", k) for k, name in enumerate(names)])

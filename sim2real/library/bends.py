@@ -27,8 +27,7 @@ COMPONENTS = {"CX": "x_force", "CY": "y_force", "CZ": "z_force", "Cl": "rolling_
 @cache
 def changes(effect: Effect) -> frozenset[str]:
     """Numbers of the aircraft (of PARAMETERS) that an effect changes."""
-    row = plain().copy()
-    effect.apply(row, effect.neutral() | {p.name: some(p) for p in effect.parameters})
+    row = changed(effect)
     return frozenset(name for name in row.dtype.names or () if np.any(row[name] != plain()[name]))
 
 
@@ -63,9 +62,8 @@ def _of_thrust(effect: Effect) -> list[str]:
 @cache
 def _of_both_engines(effect: Effect) -> bool:
     """Whether an effect changes the thrust of both engines alike, and nothing else."""
-    row = plain().copy()
-    effect.apply(row, effect.neutral() | {p.name: some(p) for p in effect.parameters})
-    return changes(effect) == set(THRUST) and bool(np.all(row[THRUST[0]] == row[THRUST[1]]))
+    left, right = (changed(effect)[factor] for factor in THRUST)
+    return changes(effect) == set(THRUST) and bool(np.all(left == right))
 
 
 @cache
@@ -152,6 +150,13 @@ def natural(effect: Effect, component: str, term: str) -> bool:
 def plain() -> NDArray:
     """The published aircraft."""
     return aircraft.load()
+
+
+def changed(effect: Effect) -> NDArray:
+    """The published aircraft with an effect of sizes that are not neutral."""
+    row = plain().copy()
+    effect.apply(row, effect.neutral() | {p.name: some(p) for p in effect.parameters})
+    return row
 
 
 def some(parameter: Parameter) -> float:

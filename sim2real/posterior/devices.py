@@ -8,7 +8,7 @@ from functools import cache
 from icing_env import effects
 from icing_env.effects import Effect
 from sim2real.actuators.paths import PATHS
-from sim2real.library.bends import plain, some
+from sim2real.library.bends import changed, plain
 from sim2real.prediction.predictor import held
 
 STEP = 0.02  # s, any
@@ -17,9 +17,7 @@ STEP = 0.02  # s, any
 @cache
 def apart(effect: Effect) -> bool:
     """Whether flights along recorded positions and powers do not know of an effect: its path alone tells of it."""
-    row = plain().copy()
-    effect.apply(row, effect.neutral() | {p.name: some(p) for p in effect.parameters})
-    return held(row, STEP).tobytes() == held(plain(), STEP).tobytes()
+    return held(changed(effect), STEP).tobytes() == held(plain(), STEP).tobytes()
 
 
 def together(names: Sequence[str]) -> int:
