@@ -9,7 +9,8 @@ import pytest
 from icing_env import scenario
 from icing_env.aircraft import load
 from icing_env.record import FlightRecord
-from sim2real.baseline.references import Baseline
+from sim2real.baseline.fit import in_any_gusts
+from sim2real.baseline.references import Baseline, directions, uncertain
 from sim2real.diagnosis import diagnose
 from sim2real.flown import first_guess, settling
 from sim2real.flown.first_guess import Guess, likeliest_guess
@@ -26,12 +27,12 @@ from testbed.flight import fly
 
 @cache
 def flown(seed: int, sigma: float, kind: Kind = LATER, stability: float = 1.0, trim: float = 0.0, roll: float = 0.0,
-          elevator: float = 1.0) -> FlightRecord:  # fmt: skip
-    """`stability`, `elevator`: shares of the published Cm_alpha, Cm_elevator; `trim`, `roll`: added to Cm_0, Cl_0."""
+          elevator: float = 1.0, lag: float = 1.0) -> FlightRecord:  # fmt: skip
+    """`stability`, `elevator`, `lag`: shares of the published Cm_alpha, Cm_elevator, Cm_alphadot; rest: added to it."""
     weather = {"turbulence_sigma_w": sigma, "turbulence_tail_delay": float(kind.tail_delay),
                "turbulence_rotation": float(kind.rotation), "Cm_alpha": stability * float(load()["Cm_alpha"][0]),
                "Cm_elevator": elevator * float(load()["Cm_elevator"][0]), "Cm_0": trim + float(load()["Cm_0"][0]),
-               "Cl_0": roll + float(load()["Cl_0"][0])}
+               "Cl_0": roll + float(load()["Cl_0"][0]), "Cm_alphadot": lag * float(load()["Cm_alphadot"][0])}
     chosen = scenario.load("clear_air", duration=52.0, parameters=weather)
     return fly(chosen, seed=seed, observer=False, protection=False).record
 
@@ -173,3 +174,14 @@ def test_air_that_does_not_turn_is_not_taken_to_turn_at_the_start_either():
     at = [TANGENT.index(name) for name in ROTATION]
     assert not still.start[at].any() and not still.K[:, at].any()
     assert np.diag(turning.start)[at].all() and turning.K[:, at].any(axis=(0, 2)).all()
+
+
+@pytest.mark.parametrize("kind", [Kind(False, False), Kind(False, True)])
+def test_references_are_fitted_in_the_gusts_that_they_met(kind):
+    """An aircraft without a lag of the downwash: fitted in gusts that the tail meets later, it has one or three."""
+    flights = [reconstruct(flown(seed, 0.5, kind, lag=0.0)) for seed in (3, 4)]
+    moves = directions(bank((), uncertain()))
+    fit = in_any_gusts(flights, moves, np.zeros(2))
+    assert fit.kind == kind and fit.walk <= 3.0
+    lag = fit.flown()[0].parameters["Cm_alphadot"][0] / load()["Cm_alphadot"][0]
+    assert lag == pytest.approx(0.0, abs=0.15)

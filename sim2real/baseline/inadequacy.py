@@ -16,12 +16,12 @@ from icing_env.record import FloatArray
 from sim2real.library.candidates import Bank
 from sim2real.posterior.attribution import reduce, with_prior
 from sim2real.posterior.generic import fit_unknown
-from sim2real.prediction.gusts import KINDS, LATER, Kind
+from sim2real.prediction.gusts import LATER, Kind
 from sim2real.prediction.kalman import Gain, gains
 from sim2real.records.channels import MEASURED
 from sim2real.records.reconstruct import Reconstruction
 from sim2real.signatures.evidence import Evidence, gather
-from sim2real.signatures.gust_intensity import SIGMAS, asked, likelihoods
+from sim2real.signatures.gust_intensity import SIGMAS, likelihoods
 from sim2real.signatures.tempering import total
 
 BATCHES = (100, 30, 10, 4)  # into which a flight is cut
@@ -30,18 +30,15 @@ WALKS = (1.0, 3.0, 10.0, 30.0, 100.0)  # times `kalman.WALK`
 OF_REFERENCES = WALKS[:-1]  # more of it would pass for gusts, or gusts for it
 
 
-def walk(flights: Sequence[Reconstruction], kinds: Sequence[Kind] = KINDS) -> tuple[float, Kind]:
-    """The likeliest of OF_REFERENCES, and of some kinds of gusts, whatever the intensity in each flight."""
-    scores = {(times, kind): sum(_likely(replace(f, inadequacy=replace(f.inadequacy, walk=times)), kind)
-                                 for f in flights) for times in OF_REFERENCES for kind in kinds}  # fmt: skip
-    return max(scores, key=lambda of: scores[of])
+def walk(flights: Sequence[Reconstruction], kind: Kind) -> float:
+    """The likeliest of OF_REFERENCES in gusts of a kind, whatever their intensity in each flight."""
+    return max(OF_REFERENCES, key=lambda times: sum(_likely(f, times, kind) for f in flights))
 
 
-def _likely(flight: Reconstruction, kind: Kind) -> float:
-    """Log likelihood of a sample in the likeliest gusts of a kind, less what is asked for that."""
-    options = gains(flight, SIGMAS if kind == LATER else SIGMAS[::2], kind)
-    scores = likelihoods(flight, options)
-    return max(scores) - asked(options[int(np.argmax(scores))])
+def _likely(flight: Reconstruction, times: float, kind: Kind) -> float:
+    """Log likelihood of a sample in the likeliest gusts of a kind."""
+    disturbed = replace(flight, inadequacy=replace(flight.inadequacy, walk=times))
+    return max(likelihoods(disturbed, gains(disturbed, SIGMAS if kind == LATER else SIGMAS[::2], kind)))
 
 
 def colour(evidences: Sequence[Evidence]) -> tuple[dict[str, float], dict[str, float]]:

@@ -1,10 +1,4 @@
-"""Flights of the same aircraft without the gap: they correct the model, and say how well it is known then.
-
-The model's numbers are fitted by Gauss-Newton, all flown anew at every step, each with a value and a change with the
-flight condition: an aircraft whose derivatives bend with angle of attack is met by lines through its test points. Their
-prior is that of the published model; where the flights contradict it a number's prior widens until they do not
-(automatic relevance: MacKay, Neural Computation 4(3), 1992), so that an aircraft far from the model is followed.
-"""
+"""Flights of the same aircraft without the gap: they correct the model, and say how well it is known then."""
 
 from __future__ import annotations
 
@@ -17,20 +11,13 @@ from numpy.typing import NDArray
 
 from icing_env import aircraft
 from icing_env.record import FlightRecord, FloatArray
-from sim2real.baseline.inadequacy import WALKS, clean, colour, walk
-from sim2real.library.candidates import INSTRUMENTS, NUISANCE_STEP, Bank, Nuisance
-from sim2real.prediction.gusts import KINDS, LATER, Kind
-from sim2real.prediction.kalman import follow
+from sim2real.baseline.fit import in_any_gusts, possible
+from sim2real.baseline.inadequacy import clean, colour
+from sim2real.library.candidates import Bank, Nuisance
+from sim2real.prediction.gusts import LATER, Kind
 from sim2real.records.reconstruct import Inadequacy, Reconstruction
-from sim2real.signatures.evidence import Evidence, gather
-from sim2real.signatures.gust_intensity import SIGMAS, choose_gain
-from sim2real.signatures.tempering import temper
 
-ROUNDS, SETTLED = 10, 4.0  # flown steps, and the whitened length of one that ends them
-AGAIN = 2  # the round after which gust intensities are chosen anew at every step: what does not fit passes for gusts
-LONGEST = 40.0  # standard deviations that a step may move a number
 REFERENCE_SPEED = 65.0  # m/s, where a number has its value; it changes with (65/V)^2, as alpha does in level flight
-CHANGES = 1.0  # prior standard deviation of that change at twice the dynamic pressure, in that of the value (assumed)
 # What the published spread leaves alone and another aircraft may have: standard deviations (assumed). No cubes: where
 # the references did not fly, they run away.
 BEYOND: dict[str, float] = {
@@ -45,8 +32,6 @@ BEYOND: dict[str, float] = {
     "Cm_alpha_elevator": 0.1, "CZ_alpha_q": 5.0, "Cm_alpha_q": 5.0, "CY_alpha_beta": 0.1, "Cl_alpha_beta": 0.02,
     "Cn_alpha_beta": 0.02, "CY_alpha_p": 0.2, "Cl_alpha_p": 0.5, "Cn_alpha_p": 0.2, "Cl_alpha_r": 0.2,
     "Cn_alpha_r": 0.2, "CY_alpha_rudder": 0.1, "Cn_alpha_aileron": 0.02, "Cn_alpha_rudder": 0.05}
-ALIKE = (*INSTRUMENTS, "spool_time")  # in all flights
-STEADY = 1e-3  # the change with the flight condition of what an instrument or a path has
 # a matter of each record and its recorder
 FIXED = ("mass", "thrust", "filter_frequency", "vane_lag", "pitot_lag", "boom_gain")
 REPEATABLE = 0.2  # standard deviations: no number is known better for another flight (assumed: 1 % of a derivative)
@@ -131,99 +116,12 @@ def fit_baseline(flights: Sequence[Reconstruction], candidates: Bank, records: S
         records: flown later, at whose airspeeds the precision is told; the reference flights' if none are given.
     """
     at = conditions([flight.record for flight in flights])
-    fit = Fit(flights, directions(candidates), at)
-    fit.run()
-    return fit.baseline(candidates, conditions(records) if records else at)
-
-
-class Fit:
-    """Values and changes of the numbers `moves`, fitted to `flights`.
-
-    x: the numbers' values, then their changes [2 n], in `moves`' units; precision: of x; walk: of `Inadequacy`.
-    """
-
-    def __init__(self, flights: Sequence[Reconstruction], moves: Sequence[Nuisance], at: FloatArray,
-                 kinds: Sequence[Kind] = KINDS) -> None:
-        """Begin with the model as it is.
-
-        Args:
-            at: condition that changes go with [flights], zeros for none.
-            kinds: of gusts, of which the likeliest is taken.
-        """
-        self.kinds = kinds
-        n = len(moves)
-        self.flights, self.moves, self.at = flights, moves, at
-        self.bank = Bank(tuple(moves), (), (), 1 + n)
-        changing = [STEADY if move.name in ALIKE else CHANGES for move in moves]
-        self.widest = np.tile([1.0 if move.name in ALIKE else np.inf for move in moves], 2)
-        self.x, self.spread = np.zeros(2 * n), np.concatenate([np.ones(n), changing])
-        self.walk, self.kind = WALKS[-1], LATER  # while the model may still be far off
-        self.precision = np.zeros((0, 0))
-        self.evidences: list[Evidence] = []
-
-    def run(self) -> None:
-        """Step until it settles, the process noise judged on the way."""
-        for k in range(ROUNDS):
-            settled = self.step(again=k > AGAIN) < SETTLED
-            if k == AGAIN or (k > AGAIN and settled):
-                last, (self.walk, self.kind) = self.walk, walk(self.flown(), self.kinds)
-                if k > AGAIN and self.walk == last:
-                    break
-
-    def flown(self) -> list[Reconstruction]:
-        """The flights over the model as fitted so far."""
-        n, out = len(self.moves), []
-        for flight, condition in zip(self.flights, self.at, strict=True):
-            row = flight.parameters.copy()
-            for nuisance, size in zip(self.moves, self.x[:n] + condition * self.x[n:], strict=True):
-                nuisance.apply(row, 0, flight.power_from, float(size))
-            out.append(replace(flight, parameters=_possible(row), inadequacy=Inadequacy(self.walk)))
-        return out
-
-    def step(self, again: bool) -> float:
-        """One step of x; its whitened length.
-
-        Args:
-            again: whether gust intensities are chosen anew.
-        """
-        flown = self.flown()
-        known = ([follow(f, choose_gain(f, SIGMAS, (), self.kind)) for f in flown] if again or not self.evidences
-                 else [e.gain for e in self.evidences])  # fmt: skip
-        self.evidences = [gather(f, self.bank, gain) for f, gain in zip(flown, known, strict=True)]
-        information, slope, tempering = _normal(self.evidences, self.at)
-        prior = np.diag(1.0 / np.maximum(self.spread, np.minimum(np.abs(self.x), self.widest)) ** 2)
-        self.precision = information / tempering + prior
-        step = -np.linalg.solve(self.precision, slope / tempering + prior @ self.x)
-        self.x = self.x + step * LONGEST / max(float(np.max(np.abs(step))), LONGEST)
-        return float(np.sqrt(step @ self.precision @ step))
-
-    def baseline(self, candidates: Bank, at: FloatArray) -> Baseline:
-        """What was fitted, and how well it flies; its precision on average over the conditions `at`."""
-        found = _baseline(candidates, self.moves, self.x, self.precision, at)
-        left = Inadequacy(self.walk, *colour(self.evidences))
-        flown = [replace(flight, inadequacy=left) for flight in self.flown()]
-        told = clean(flown, [e.gain for e in self.evidences], candidates, found.precision)
-        return replace(found, inadequacy=left, clean=told, kind=self.kind)
-
-
-def _possible(row: NDArray) -> NDArray:
-    """No negative lags."""
-    for name in ("elevator_lag", "aileron_lag", "rudder_lag", "vane_lag"):
-        row[name] = np.maximum(row[name], 1e-3)
-    return row
-
-
-def _normal(evidences: Sequence[Evidence], at: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Information and slope of values and changes together [2 n], and what to divide them by (see tempering.temper)."""
-    n = len(evidences[0].gram) - 1
-    information, slope, misfit = np.zeros((2 * n, 2 * n)), np.zeros(2 * n), 0.0
-    for evidence, condition in zip(evidences, at, strict=True):
-        both = np.vstack([np.eye(n), condition * np.eye(n)]) / NUISANCE_STEP
-        information += both @ evidence.gram[1:, 1:] @ both.T
-        slope += both @ evidence.gram[1:, 0]
-        misfit += evidence.gram[0, 0]
-    gain = float(slope @ np.linalg.lstsq(information, slope, rcond=1e-9)[0])
-    return information, slope, temper(max(misfit - gain, 0.0), evidences)
+    fit = in_any_gusts(flights, directions(candidates), at)
+    found = _baseline(candidates, fit.moves, fit.x, fit.precision, conditions(records) if records else at)
+    left = Inadequacy(fit.walk, *colour(fit.evidences))
+    flown = [replace(flight, inadequacy=left) for flight in fit.flown()]
+    told = clean(flown, fit.gains(), candidates, found.precision)
+    return replace(found, inadequacy=left, clean=told, kind=fit.kind)
 
 
 def _baseline(candidates: Bank, moves: Sequence[Nuisance], x: FloatArray, precision: FloatArray,
@@ -251,4 +149,4 @@ def _baseline(candidates: Bank, moves: Sequence[Nuisance], x: FloatArray, precis
         if nuisance.name in FIXED:
             out[j], out[:, j] = 0.0, 0.0
             out[j, j] = 1.0
-    return Baseline(_possible(row), 0.5 * (out + out.T), changes, spread=None)
+    return Baseline(possible(row), 0.5 * (out + out.T), changes, spread=None)

@@ -19,7 +19,8 @@ from scipy.stats import chi2
 from icing_env import effects
 from icing_env.effects.discrepancy import TERMS
 from icing_env.record import FloatArray
-from sim2real.baseline.references import ALIKE, Fit, directions
+from sim2real.baseline.fit import ALIKE, Fit
+from sim2real.baseline.references import directions
 from sim2real.closing import gap
 from sim2real.closing.black_box import FELT, PUSHED, residual_accelerations
 from sim2real.closing.remedy import Remedy, Values
@@ -30,7 +31,6 @@ from sim2real.posterior.generic import UnknownFit
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
 from sim2real.posterior.sets import SetFit
 from sim2real.posterior.widened import SIZES
-from sim2real.prediction.gusts import LATER
 from sim2real.records.channels import TOLERANCE
 from sim2real.records.reconstruct import Reconstruction
 
@@ -142,7 +142,7 @@ def fit_whole_model(flights: Sequence[Reconstruction], candidates: Bank, posteri
     """
     numbers = _numbers(flights[0], candidates, posterior)
     # what the model lacks here passes for gusts of another kind
-    fit = Fit(flights, [n.move for n in numbers], np.zeros(len(flights)), (LATER,))
+    fit = Fit(flights, [n.move for n in numbers], np.zeros(len(flights)))
     fit.run()
     x, count = fit.x[: len(numbers)], len(numbers)
     unit = np.array([n.move.factor / n.per for n in numbers])

@@ -90,7 +90,13 @@ def turns(flights: Sequence[Reconstruction], found: Sequence[Gain]) -> bool:
     Of other kinds gusts often look several times as strong as they are, up to the strongest: any is tried. Nothing
     is said where the model is known to follow poorly, or in calm.
     """
-    told = [of for of in zip(flights, found, strict=True) if of[0].inadequacy.followed and of[1].sigma >= CALM]
+    told = [of for of in zip(flights, found, strict=True) if of[0].inadequacy.followed]
+    return bool(told) and in_turning_air(*zip(*told, strict=True))
+
+
+def in_turning_air(flights: Sequence[Reconstruction], found: Sequence[Gain]) -> bool:
+    """The same of flights however they are followed: reference flights, whose numbers are at their best."""
+    told = [of for of in zip(flights, found, strict=True) if of[1].sigma >= CALM]
     return bool(told) and bool(np.max(np.sum(each(_turning, *zip(*told, strict=True)), axis=0)) > 0.0)
 
 
