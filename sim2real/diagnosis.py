@@ -239,7 +239,7 @@ def _reconstructed(records: Sequence[FlightRecord], baseline: Baseline | None, s
     records = with_recorder(records)
     flights = [reconstruct(record) for record in records] if baseline is None else [
         replace(reconstruct(record, baseline.near(record)), inadequacy=baseline.inadequacy) for record in records]
-    flights = in_common([placed(flight) for flight in prompt(met_together(in_step(of_all_servos(flights))))])
+    flights = in_common(placed(prompt(met_together(in_step(of_all_servos(flights))))))
     if simulator is None:
         return flights
     yours = [flying_as(reconstruct(record), simulator) for record in records]

@@ -8,8 +8,9 @@ not recorded too; else where it was recorded, noise and all.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,75 +28,206 @@ from sim2real.records.rounding import SEVERAL, rounding
 
 PLACED = 3e-5  # rad, what a fitted law leaves (assumed: a position's noise over the root of the samples behind a term)
 EXACT = 3e-6  # rad, the same of a law of which nothing but the lag is fitted (assumed)
-RATE, DRIFTS = 3, 6  # its column in a basis; cosines over a record that a law's shift may take
+DRIFTS = 6  # cosines over a record that a law's shift may take
+SHARED, OWN = slice(0, 4), slice(4, None)  # columns of a basis: of an actuator, in all records; of each record
+RATE = 2  # the column of an advance
+NOTHING, GEARED, EVERY = (0, 0), (1, 1), (4, 1 + DRIFTS)  # how many of either a law has
+AT_LIMIT = 0.98  # share of a rate limit that is at it
+RATES, ANOTHER, TURNS = (-1.2, 1.2), (0.9, 1.1), 3  # logarithms of times the published limit; times it that are another
 SCALES = (5, 25, 100)  # samples over which what is left has to average out as white noise does
 SHORTEST, FINE = 1e-3, 1e-4  # s: least lag, and how finely it is found
 CHANCE, SURE = 1e-5, 1.05  # of white noise not to pass for it; what the noise itself may be off by (squared)
 
 
-def placed(flight: Reconstruction) -> Reconstruction:
-    """The record with every surface where its command puts it, if nothing but white noise is between."""
-    controls, noise = dict(flight.controls), flight.surface_noise.copy()
+def placed(flights: Sequence[Reconstruction]) -> list[Reconstruction]:
+    """Records of one aircraft with every surface where its command puts it, if nothing but white noise is between."""
+    moved = [(dict(flight.controls), flight.surface_noise.copy()) for flight in flights]
     for j, surface in enumerate(SURFACES):
-        command = flight.commands.get(f"{surface}_command")
-        recorded = flight.positions[surface][np.isfinite(flight.positions[surface])]
-        if command is not None and not len(recorded):
-            controls[surface] = _behind(flight, command, surface, flight.parameters[f"{surface}_lag"][0], False)
-            continue  # nothing says how well it follows: as uncertain as if it had been recorded
-        if command is None or not np.any(recorded != recorded[:1]):
-            continue  # not recorded, or stuck
-        law = _law(flight, command, surface)
-        if law is not None:
-            controls[surface], noise[j] = law
-    return replace(flight, controls=controls, surface_noise=noise)
+        paths = list[_Path]()
+        for flight, (controls, _) in zip(flights, moved, strict=True):
+            command = flight.commands.get(f"{surface}_command")
+            recorded = flight.positions[surface][np.isfinite(flight.positions[surface])]
+            if command is not None and not len(recorded):
+                # nothing says how well it follows: as uncertain as if it had been recorded
+                controls[surface] = _behind(flight, command, surface, flight.parameters[f"{surface}_lag"][0], False)
+            elif command is not None and np.any(recorded != recorded[:1]):  # neither absent nor stuck
+                paths.append(_Path(flight, command, surface))
+        for path, law in zip(paths, _laws(paths), strict=True):
+            if law is not None:
+                controls, noise = next(m for f, m in zip(flights, moved, strict=True) if f is path.flight)
+                controls[surface], noise[j] = law
+    return [replace(flight, controls=controls, surface_noise=noise)
+            for flight, (controls, noise) in zip(flights, moved, strict=True)]
 
 
-def _law(flight: Reconstruction, command: FloatArray, surface: str) -> tuple[FloatArray, float] | None:
-    """Positions [N] before the recording's low pass, as the command makes them, and how well they are known.
+@dataclass(frozen=True)
+class _Path:
+    """One surface along one record that has its command and its positions."""
 
-    The simplest law that says it: the published actuator, the same at another lag, geared and shifted, bent and
-    drifting too. Every number fitted costs the logarithm of the samples (Schwarz, Annals of Statistics 6, 1978), for it
-    is fitted to noise: a shift of 4e-5 rad of an aileron, held for 40 s, is a rolling moment that everybody can see.
+    flight: Reconstruction
+    command: FloatArray
+    surface: str
+    quick: float = 1.0  # times the published rate limit
+
+    @property
+    def published(self) -> float:
+        """The actuator's lag, s."""
+        return float(self.flight.parameters[f"{self.surface}_lag"][0])
+
+    @cached_property
+    def good(self) -> NDArray[np.bool_]:
+        """Steps at which the position was recorded [N]."""
+        return np.isfinite(self.flight.positions[self.surface])
+
+    @cached_property
+    def recorded(self) -> FloatArray:
+        """Positions where they were recorded, rad."""
+        return self.flight.positions[self.surface][self.good]
+
+    @cached_property
+    def least(self) -> float:
+        """Noise that rounding leaves, rad."""
+        return rounding(self.recorded, SEVERAL)
+
+    @property
+    def known(self) -> float:
+        """Times which what is left by a law is as large."""
+        return max(1.0, self.least / POSITION_NOISE)
+
+    def behind(self, lag: float, filtered: bool = True) -> tuple[FloatArray, FloatArray]:
+        """What the actuator at some lag makes of a position [N, terms]: what is the aircraft's, and the record's."""
+        basis = _basis(_behind(self.flight, self.command, self.surface, lag, filtered, self.quick))
+        return basis[:, SHARED], basis[:, OWN]
+
+    def limited(self) -> bool:
+        """Whether its rate is at the limit somewhere."""
+        limit = float(self.flight.parameters[f"{self.surface}_rate"][0]) * self.flight.dt
+        moved = _behind(self.flight, self.command, self.surface, self.published, False)
+        return bool(np.max(np.abs(np.diff(moved)), initial=0.0) > AT_LIMIT * limit)
+
+    def alone(self) -> bool:
+        """Whether nothing need be fitted."""
+        shared, own = (part[self.good] for part in self.behind(self.published))
+        return _published(self.recorded - shared[:, 0], np.column_stack([shared, own]), self.least)
+
+
+def _laws(paths: Sequence[_Path]) -> list[tuple[FloatArray, float] | None]:
+    """For each record positions [N] before its low pass, as commands make them, and how well they are known; or None.
+
+    One law for all records: gear and lag are the aircraft's, and a record in which a surface hardly moves tells a gear
+    1 % off, which is a roll damping 1 % off there. Where that leaves more than noise in one, its own.
     """
-    good, published = np.isfinite(flight.positions[surface]), float(flight.parameters[f"{surface}_lag"][0])
-    recorded, n = flight.positions[surface][good], int(np.count_nonzero(good))
-    least = rounding(recorded, SEVERAL)
-    known = max(1.0, least / POSITION_NOISE)  # times which what is left by a law is as large
-
-    def behind(lag: float, filtered: bool = True) -> FloatArray:
-        return _basis(_behind(flight, command, surface, lag, filtered))
-
-    def weights(lag: float, terms: int) -> FloatArray:
-        """Of the basis' first terms; the position itself where none is fitted."""
-        basis = behind(lag)[good]
-        out = np.eye(basis.shape[1])[0]
-        if terms:
-            out = np.zeros(basis.shape[1])
-            out[:terms] = np.linalg.lstsq(basis[:, :terms], recorded, rcond=None)[0]
-        return out
-
-    def left(lag: float, terms: int) -> FloatArray:
-        return np.asarray(recorded - behind(lag)[good] @ weights(lag, terms))
-
-    def square(lag: float, terms: int) -> float:
-        return float(np.sum(left(lag, terms) ** 2))
-
-    if _published(left(published, 0), behind(published)[good], least):
-        return behind(published, filtered=False)[:, 0], EXACT * known
-    every = behind(published).shape[1]
-    laws = [(published, 0, 0), *((_lag(square, terms, published), terms, terms + 1) for terms in (0, 2, every))]
-    noise = max(white(left(laws[-1][0], every)), least, 1e-9)
-    fitting = [law for law in laws if _nothing_else(left(*law[:2]), least)]
-    if not fitting:
-        return None
-    lag, terms, _ = min(fitting, key=lambda law: square(*law[:2]) / noise**2 + law[2] * np.log(n))
-    return np.asarray(behind(lag, filtered=False) @ weights(lag, terms)), (PLACED if terms else EXACT) * known
+    if all(path.alone() for path in paths):
+        return [(path.behind(path.published, filtered=False)[0][:, 0], EXACT * path.known) for path in paths]
+    paths = _at_their_rate(paths)
+    together = _law(paths)
+    return [law if law is not None or len(paths) == 1 else
+            (path.behind(path.published, filtered=False)[0][:, 0], EXACT * path.known) if path.alone() else
+            _law([path])[0] for path, law in zip(paths, together, strict=True)]  # fmt: skip
 
 
-def _behind(flight: Reconstruction, command: FloatArray, surface: str, lag: float, filtered: bool) -> FloatArray:
+def _at_their_rate(paths: Sequence[_Path]) -> Sequence[_Path]:
+    """The same behind an actuator of another rate limit, which no source tells, where that leaves plainly less."""
+    if not any(path.limited() for path in paths):
+        return paths
+
+    def of(quick: float) -> _Fit:
+        return _Fit([replace(path, quick=quick) for path in paths], GEARED)
+
+    before = of(1.0).square(lag := _lag(of(1.0).square, paths[0].published))
+    if min(of(quick).square(lag) for quick in ANOTHER) > before:
+        return paths
+    for _ in range(TURNS):  # a slow actuator passes for a late one, and the other way about
+        found = minimize_scalar(lambda log, lag=lag: of(float(np.exp(log))).square(lag), bounds=RATES, method="bounded",
+                                options={"xatol": 0.01})  # fmt: skip
+        quick = float(np.exp(found.x))
+        lag = _lag(of(quick).square, paths[0].published)
+    noise = max(float(np.median([white(path.recorded) for path in paths])), *(path.least for path in paths), 1e-9)
+    enough = 2.0 * np.log(sum(len(path.recorded) for path in paths))
+    return of(quick).paths if before - of(quick).square(lag) > enough * noise**2 else paths
+
+
+def _law(paths: Sequence[_Path]) -> list[tuple[FloatArray, float] | None]:
+    """The simplest law that says where a surface was: for each record positions and how well they are known, or None.
+
+    The published actuator, the same at another lag, geared and shifted, bent and drifting too. Every number fitted
+    costs the logarithm of the samples (Schwarz, Annals of Statistics 6, 1978), for it is fitted to noise: a shift of
+    4e-5 rad of an aileron, held for 40 s, is a rolling moment that everybody can see.
+    """
+    published = paths[0].published
+    fits = [_Fit(paths, terms) for terms in (NOTHING, GEARED, EVERY)]
+    laws = [(fits[0], published, 0), *((fit, _lag(fit.square, published), 1 + fit.count) for fit in fits)]
+    noise = max(float(np.median([white(left) for left in fits[-1].left(laws[-1][1])])),
+                *(path.least for path in paths), 1e-9)
+    n = sum(len(path.recorded) for path in paths)
+    cost = [fit.square(lag) / noise**2 + count * np.log(n) for fit, lag, count in laws]
+    out = list[tuple[FloatArray, float] | None]()
+    fitting = [[_nothing_else(left, path.least) for left, path in zip(fit.left(lag), paths, strict=True)]
+               for fit, lag, _ in laws]  # fmt: skip
+    best = min((k for k in range(len(laws)) if all(fitting[k])), key=lambda k: cost[k], default=None)
+    best = best if best is not None else max(range(len(laws)), key=lambda k: (sum(fitting[k]), -cost[k]))
+    fit, lag, count = laws[best]
+    for path, there, fits_it in zip(paths, fit.positions(lag), fitting[best], strict=True):
+        out.append((there, (PLACED if count > 1 else EXACT) * path.known) if fits_it else None)
+    return out
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """A law's numbers at some lag: of `terms`, how many the aircraft has and how many every record has besides."""
+
+    paths: Sequence[_Path]
+    terms: tuple[int, int]
+
+    @property
+    def count(self) -> int:
+        """Of numbers fitted, the lag apart."""
+        return self.terms[0] + self.terms[1] * len(self.paths)
+
+    def weights(self, lag: float) -> tuple[FloatArray, list[FloatArray]]:
+        """Those of the aircraft, and of every record; the position itself where none is fitted."""
+        shared, own = self.terms
+        parts = [tuple(part[path.good] for part in path.behind(lag)) for path in self.paths]
+        first = np.eye(parts[0][0].shape[1])[0]
+        if shared:
+            inside = [_without(own_of[:, :own], np.column_stack([of_all[:, :shared], path.recorded]))
+                      for (of_all, own_of), path in zip(parts, self.paths, strict=True)]
+            first = np.zeros_like(first)
+            first[:shared] = np.linalg.lstsq(np.vstack([columns[:, :-1] for columns in inside]),
+                                             np.concatenate([columns[:, -1] for columns in inside]), rcond=None)[0]
+        return first, [np.linalg.lstsq(own_of[:, :own], path.recorded - of_all @ first, rcond=None)[0]
+                       for (of_all, own_of), path in zip(parts, self.paths, strict=True)]
+
+    def positions(self, lag: float, filtered: bool = False) -> list[FloatArray]:
+        """Of every record [N], before the recording's low pass or behind it."""
+        first, beside = self.weights(lag)
+        parts = [path.behind(lag, filtered) for path in self.paths]
+        return [np.asarray(of_all @ first + own_of[:, : len(more)] @ more)
+                for (of_all, own_of), more in zip(parts, beside, strict=True)]
+
+    def left(self, lag: float) -> list[FloatArray]:
+        """What the recorded positions have beside."""
+        return [path.recorded - there[path.good]
+                for path, there in zip(self.paths, self.positions(lag, filtered=True), strict=True)]
+
+    def square(self, lag: float) -> float:
+        """Sum of the squares of that."""
+        return float(sum(left @ left for left in self.left(lag)))
+
+
+def _without(own: FloatArray, columns: FloatArray) -> FloatArray:
+    """Columns less what `own` ones explain."""
+    if not own.shape[1]:
+        return columns
+    q = np.linalg.qr(own)[0]
+    return np.asarray(columns - q @ (q.T @ columns))
+
+
+def _behind(flight: Reconstruction, command: FloatArray, surface: str, lag: float, filtered: bool, quick: float = 1.0
+            ) -> FloatArray:  # fmt: skip
     """Positions [N] of the published actuator at some lag, behind the recording's low pass or before it."""
     row = flight.parameters.copy()
-    row[f"{surface}_lag"] = lag
+    row[f"{surface}_lag"], row[f"{surface}_rate"] = lag, quick * row[f"{surface}_rate"]
     if not filtered:
         row["filter_frequency"] = UNFILTERED
     return follow(command, command[0], row, surface, flight.dt)[:, 0]
@@ -115,12 +247,12 @@ def _published(left: FloatArray, basis: FloatArray, least: float) -> bool:
     return _nothing_else(left, least) and gain(basis[:, RATE : RATE + 1]) < cost and gain(basis) < 3.0 * cost
 
 
-def _lag(square: Callable[[float, int], float], terms: int, published: float) -> float:
+def _lag(square: Callable[[float], float], published: float) -> float:
     """The lag that leaves least."""
     lags = np.unique(np.maximum(published + LAGS, SHORTEST))
-    k = int(np.argmin([square(lag, terms) for lag in lags]))
+    k = int(np.argmin([square(lag) for lag in lags]))
     near = (lags[max(k - 1, 0)], lags[min(k + 1, len(lags) - 1)])
-    return float(minimize_scalar(square, bounds=near, args=(terms,), method="bounded", options={"xatol": FINE}).x)
+    return float(minimize_scalar(square, bounds=near, method="bounded", options={"xatol": FINE}).x)
 
 
 def _basis(position: FloatArray) -> FloatArray:
@@ -128,7 +260,7 @@ def _basis(position: FloatArray) -> FloatArray:
     n = len(position)
     slow = np.cos(np.pi * np.arange(DRIFTS + 1) * (np.arange(n)[:, None] + 0.5) / n)
     rate = np.gradient(position)
-    return np.column_stack([position, slow[:, 0], position**3, rate, np.gradient(rate), slow[:, 1:]])
+    return np.column_stack([position, position**3, rate, np.gradient(rate), slow])
 
 
 def _nothing_else(left: NDArray, least: float) -> bool:
