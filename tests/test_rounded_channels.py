@@ -104,7 +104,7 @@ def test_a_rounded_torque_is_noise_and_a_lever_that_stands_still_is_not():
 
 
 def test_a_rounded_surface_follows_its_command_all_the_same():
-    sharp, rounded = placed(reconstruct(flown(3))), placed(reconstruct(on_levels(flown(3), LEVELS)))
+    sharp, rounded = (placed([reconstruct(record)])[0] for record in (flown(3), on_levels(flown(3), LEVELS)))
     for j, surface in enumerate(("elevator", "aileron", "rudder")):
         assert np.sqrt(np.mean((rounded.controls[surface] - sharp.controls[surface]) ** 2)) < 0.01 * DEG
         assert sharp.surface_noise[j] < rounded.surface_noise[j] < SURFACE_NOISE
