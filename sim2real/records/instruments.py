@@ -11,7 +11,7 @@ L lacks L times the rate.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -33,8 +33,6 @@ KNOWN, APART = 0.002, 0.003  # s: how well attitudes have to tell a low pass, an
 SPAN, FEWEST = 5.0, 6  # s over which attitudes and integrated rates are compared (gyros drift beyond), and how often
 RATES = ("p", "q", "r", "phi", "theta")
 FLOOR = 2e-4  # s: no lag of a recorder is known better (assumed)
-UNEVEN = 0.01  # of a sample, by which stamps of even ones stray
-PASSED = ("alpha", "beta", "p", "q", "r", "ax", "ay", "az", "elevator", "aileron", "rudder")  # by the low pass
 MISSING = 0.02  # share of samples that a channel may lack there
 
 
@@ -48,7 +46,7 @@ def with_recorder(records: Sequence[FlightRecord]) -> list[FlightRecord]:
 
     Attitudes that are declared to be late are so no more.
     """
-    records = [with_prompt_attitudes(prompt(record)) for record in records]
+    records = [with_prompt_attitudes(record) for record in records]
     told = recorder_lags([record for record in records if "filter" not in record.meta.sensors])
     if told is None:
         return list(records)
@@ -159,59 +157,25 @@ def thrust_was_measured(record: FlightRecord) -> bool:
     return bool(source == "measured")
 
 
-def prompt(record: FlightRecord) -> FlightRecord:
-    """The record less the whole samples by which a declared low pass of second or higher order is late.
-
-    Such a filter passes what an aircraft does whole, only late, where one of first order that is as late weakens it (at
-    2 Hz one of 5 Hz passes 0.99, and 0.87). What is left of the last sample is taken for a filter of first order.
-
-    Raises:
-        InputError: a declaration that is none.
-    """
-    table = _table(record.meta.sensors, "filter")
-    late = _low_pass(table)
-    samples = int((late or 0.0) / record.dt + 1e-9) if table.get("order", 1) >= 2 else 0
-    if late is None or samples == 0 or np.ptp(np.diff(record.time)) > UNEVEN * record.dt:
-        return record
-    channels = dict(record.channels)
-    for name in PASSED:
-        if name in channels:
-            channels[name] = np.concatenate([channels[name][samples:], np.full(samples, np.nan)])
-    left = {"lag": late - samples * record.dt, "earlier": samples * record.dt}
-    sensors = {**record.meta.sensors, "filter": left}
-    return replace(record, channels=channels, meta=replace(record.meta, sensors=sensors))
-
-
-def _low_pass(table: Mapping[str, Any]) -> float | None:
-    """By how much what passes shows late, s; None where nothing is declared.
-
-    Raises:
-        InputError: a declaration that is none.
-    """
+def _recorder(row: NDArray, sensors: Any, dt: float, notes: list[str]) -> None:
+    table = _table(sensors, "filter")
     for key in ("lag", "frequency", "order"):
         value = table.get(key, 0.0)
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
             raise InputError(f"sensors.filter.{key} must be a number, 0 for no low pass, got {value!r}")
     if "lag" in table:
-        return float(table["lag"])
-    if "frequency" not in table:
-        return None
-    slope = 1.0 / math.sin(0.5 * math.pi / max(table.get("order", 1), 1))  # of its phase at low frequencies
-    return slope / (2.0 * math.pi * table["frequency"]) if table["frequency"] else 0.0
-
-
-def _recorder(row: NDArray, sensors: Any, dt: float, notes: list[str]) -> None:
-    table = _table(sensors, "filter")
-    late = _low_pass(table)
-    if late is None:
-        if abs(dt - STEP) <= 1e-6:
-            return
+        late = float(table["lag"])
+    elif "frequency" in table:
+        slope = 1.0 / math.sin(0.5 * math.pi / max(table.get("order", 1), 1))  # of its phase at low frequencies
+        late = slope / (2.0 * math.pi * table["frequency"]) if table["frequency"] else 0.0
+    elif abs(dt - STEP) > 1e-6:
         late = _published_lag()
+    else:
+        return
     row["filter_frequency"] = 1.0 / (2.0 * math.pi * time_constant(late, dt)) if late > 0.0 else UNFILTERED
     if table:
-        how, earlier = "attitudes tell" if table.get("found") else "declared", table.get("earlier", 0.0)
-        notes.append(f"low pass of the recorder late by {1e3 * (late + earlier):.3g} ms, as {how}"
-                     + (f": {1e3 * earlier:.3g} ms of it taken out" if earlier else ""))
+        how = "attitudes tell" if table.get("found") else "declared"
+        notes.append(f"low pass of the recorder late by {1e3 * late:.3g} ms, as {how}")
 
 
 def _table(sensors: Any, name: str) -> Any:

@@ -153,7 +153,7 @@ def reconstruct(record: FlightRecord, base: NDArray | None = None) -> Reconstruc
     Raises:
         InputError: the record is wrong or lacks what a longitudinal diagnosis needs.
     """
-    record = instruments.prompt(check(record))
+    record = check(record)
     notes: list[str] = []
     at, dt, values = _steps(record, notes)
     record = record.with_problems(_unrecorded(values, record))
