@@ -99,6 +99,10 @@ class _Path:
         basis = _basis(_behind(self.flight, self.command, self.surface, lag, filtered, self.quick))
         return basis[:, SHARED], basis[:, OWN]
 
+    def as_published(self) -> tuple[FloatArray, float]:
+        """Positions [N] before the low pass that the published actuator makes, and how well they are known."""
+        return self.behind(self.published, filtered=False)[0][:, 0], EXACT * self.known
+
     def limited(self) -> bool:
         """Whether its rate is at the limit somewhere."""
         limit = float(self.flight.parameters[f"{self.surface}_rate"][0]) * self.flight.dt
@@ -118,12 +122,11 @@ def _laws(paths: Sequence[_Path]) -> list[tuple[FloatArray, float] | None]:
     1 % off, which is a roll damping 1 % off there. Where that leaves more than noise in one, its own.
     """
     if all(path.alone() for path in paths):
-        return [(path.behind(path.published, filtered=False)[0][:, 0], EXACT * path.known) for path in paths]
+        return [path.as_published() for path in paths]
     paths = _at_their_rate(paths)
     together = _law(paths)
-    return [law if law is not None or len(paths) == 1 else
-            (path.behind(path.published, filtered=False)[0][:, 0], EXACT * path.known) if path.alone() else
-            _law([path])[0] for path, law in zip(paths, together, strict=True)]  # fmt: skip
+    return [law if law is not None or len(paths) == 1 else path.as_published() if path.alone() else _law([path])[0]
+            for path, law in zip(paths, together, strict=True)]  # fmt: skip
 
 
 def _at_their_rate(paths: Sequence[_Path]) -> Sequence[_Path]:
