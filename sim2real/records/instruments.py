@@ -25,6 +25,8 @@ from estimators.signals.resample import common_grid
 from icing_env import aircraft
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord, FloatArray
+from sim2real.records.channels import SURFACES
+from sim2real.records.low_pass import in_first_order
 
 STEP = 0.02  # s, at which the aircraft file's instruments take in what they read (icing_env.simulate)
 UNFILTERED = 1e6  # Hz: no low pass
@@ -32,6 +34,7 @@ LONGEST = 0.05  # s: a recorder's low pass is not slower, nor do attitudes lag m
 KNOWN, APART = 0.002, 0.003  # s: how well attitudes have to tell a low pass, and how far it has to be from the file's
 SPAN, FEWEST = 5.0, 6  # s over which attitudes and integrated rates are compared (gyros drift beyond), and how often
 RATES = ("p", "q", "r", "phi", "theta")
+PASSED = ("alpha", "beta", *RATES[:3], "ax", "ay", "az", *SURFACES)  # the recorder's low pass
 FLOOR = 2e-4  # s: no lag of a recorder is known better (assumed)
 MISSING = 0.02  # share of samples that a channel may lack there
 
@@ -142,7 +145,7 @@ def declared(row: NDArray, record: FlightRecord, values: dict[str, FloatArray], 
         row["boom_gain"] = known.bending
     if _table(sensors, "thrust").get("found"):
         notes.append("thrust taken as measured: it is another function of torque and airspeed than in the references")
-    _recorder(row, sensors, dt, notes)
+    _recorder(row, sensors, values, dt, notes)
 
 
 def thrust_was_measured(record: FlightRecord) -> bool:
@@ -157,17 +160,18 @@ def thrust_was_measured(record: FlightRecord) -> bool:
     return bool(source == "measured")
 
 
-def _recorder(row: NDArray, sensors: Any, dt: float, notes: list[str]) -> None:
+def _recorder(row: NDArray, sensors: Any, values: dict[str, FloatArray], dt: float, notes: list[str]) -> None:
     table = _table(sensors, "filter")
     for key in ("lag", "frequency", "order"):
         value = table.get(key, 0.0)
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
             raise InputError(f"sensors.filter.{key} must be a number, 0 for no low pass, got {value!r}")
+    cut, order = float(table.get("frequency", 0.0)), max(math.ceil(table.get("order", 1)), 1)
     if "lag" in table:
-        late = float(table["lag"])
+        late, order = float(table["lag"]), 1
     elif "frequency" in table:
-        slope = 1.0 / math.sin(0.5 * math.pi / max(table.get("order", 1), 1))  # of its phase at low frequencies
-        late = slope / (2.0 * math.pi * table["frequency"]) if table["frequency"] else 0.0
+        slope = 1.0 / math.sin(0.5 * math.pi / order)  # of its phase at low frequencies
+        late = slope / (2.0 * math.pi * cut) if cut else 0.0
     elif abs(dt - STEP) > 1e-6:
         late = _published_lag()
     else:
@@ -176,6 +180,9 @@ def _recorder(row: NDArray, sensors: Any, dt: float, notes: list[str]) -> None:
     if table:
         how = "attitudes tell" if table.get("found") else "declared"
         notes.append(f"low pass of the recorder late by {1e3 * late:.3g} ms, as {how}")
+    if order > 1 and cut:
+        first = float(row["filter_frequency"][0])
+        values |= {n: in_first_order(values[n], cut, order, first, dt) for n in PASSED if n in values}
 
 
 def _table(sensors: Any, name: str) -> Any:
