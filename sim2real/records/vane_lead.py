@@ -33,7 +33,24 @@ def met_together(flights: Sequence[Reconstruction]) -> list[Reconstruction]:
     boom, error = boom_of_vanes(flights)
     if not (boom > CLEAR * error and LEAST < boom < LONGEST):
         return list(flights)
+    place = _declared(flights)
+    if place is not None and abs(boom - place) < 0.5 * place:  # nearer to that than to the centre of gravity
+        return [_later(flight, place, ", as declared") for flight in flights]
     return [_later(flight, boom) for flight in flights]
+
+
+def _declared(flights: Sequence[Reconstruction]) -> float | None:
+    """How far ahead side files say that the vane of alpha is, m; None where they do not, or not all the same.
+
+    They tell it of vanes that were corrected to the centre of gravity, too: by rates, which takes no gust back.
+    """
+    places = set()
+    for flight in flights:
+        entry = flight.record.meta.sensors.get("alpha")
+        place = entry.get("position") if isinstance(entry, dict) else None
+        ahead = place[0] if isinstance(place, list | tuple) and len(place) == 3 else None
+        places.add(float(ahead) if isinstance(ahead, int | float) else None)
+    return places.pop() if len(places) == 1 else None
 
 
 def boom_of_vanes(flights: Sequence[Reconstruction]) -> tuple[float, float]:
@@ -99,7 +116,7 @@ def _behind(angle: FloatArray, lag: float, dt: float) -> FloatArray:
     return np.asarray(lfilter([share], [1.0, share - 1.0], angle))
 
 
-def _later(flight: Reconstruction, boom: float) -> Reconstruction:
+def _later(flight: Reconstruction, boom: float, how: str = "") -> Reconstruction:
     """The record with flow angles at the centre of gravity, none where it had none."""
     measured, row = flight.measured.copy(), flight.parameters.copy()
     angles, more = _at_centre(flight, _lead(flight, boom))
@@ -108,4 +125,4 @@ def _later(flight: Reconstruction, boom: float) -> Reconstruction:
         measured[:, column] = np.where(np.isfinite(measured[:, column]), angle, np.nan)
     row["vane_lag"] = row["vane_lag"] + more
     return replace(flight, measured=measured, parameters=row, notes=(
-        *flight.notes, f"vanes meet gusts {boom:.1f} m before the wings: taken at the centre of gravity"))
+        *flight.notes, f"vanes meet gusts {boom:.1f} m before the wings{how}: taken at the centre of gravity"))
