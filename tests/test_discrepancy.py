@@ -256,6 +256,7 @@ def test_the_form_of_a_known_effect_is_flown_with_it():
     assert found.gap["held_out"]["closure"] > 0.7
 
 
+@pytest.mark.slow
 def test_a_form_that_goes_with_speed_is_no_size_that_changes():
     """Derivatives at the component are among the form's terms: moved beside these, they would count twice."""
     grows = {"Cl_0": 0.006, "Cl_airspeed": 2e-4, "Cl_beta": -0.03, "at_airspeed": 75.0}

@@ -28,6 +28,7 @@ from sim2real.library.candidates import (
 from testbed.flight import fly
 from testbed.withheld.flights import Aircraft
 
+LONGEST = ("engine_arm_z", "Cm_elevator_CT")
 BIASES = {"bias_alpha": 2e-3, "bias_beta": -1.5e-3, "bias_q": 5e-4, "bias_az": 0.03, "bias_theta": 1.5e-3}
 
 
@@ -48,7 +49,8 @@ def test_without_references_offsets_beyond_a_calibration_are_a_gap(tmp_path, tim
     assert (diagnose(in_still_air(tmp_path, "diagnose", own, 2)).verdict != "no_gap") == gap
 
 
-@pytest.mark.parametrize("number", TOLD_ONCE)
+@pytest.mark.parametrize("number", [
+    pytest.param(n, marks=pytest.mark.slow) if n in LONGEST else n for n in TOLD_ONCE])  # fmt: skip
 def test_a_number_that_one_source_tells_may_be_another_without_a_gap(tmp_path, number):
     far = 8.0 if number == "spool_time" else -8.0  # no engine spools before it is told to
     within, beyond = (Aircraft(baseline={number: 1.0 + times * TOLD_ONCE[number]}) for times in (-1.2, far))

@@ -53,7 +53,8 @@ def test_its_clean_aircraft_has_no_gap(tmp_path, sigma, gusts, seed):
 
 
 @pytest.mark.parametrize(("effect", "size"), [
-    ("elevator_power", -0.25), pytest.param("aileron_gearing", -0.2, marks=pytest.mark.slow),
+    pytest.param("elevator_power", -0.25, marks=pytest.mark.slow),
+    pytest.param("aileron_gearing", -0.2, marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_an_effect_of_it_is_told_alone(tmp_path, effect, size):
     found = solve(case(tmp_path / "case", 0.5, "at_once", 7, ((effect, "same", size),)))

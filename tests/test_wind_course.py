@@ -50,6 +50,7 @@ def test_a_front_is_unknown_at_the_wind():
     assert told["coefficient"] == pytest.approx(along / np.sqrt(2.0), rel=0.3)  # none of it across
 
 
+@pytest.mark.slow
 def test_a_stronger_one_is_told_as_wind():
     found = diagnose([through_a_front(4.0)])  # one record: wind effects of the library with a bias may say it as well
     assert found.verdict != "no_gap"
