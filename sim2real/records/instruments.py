@@ -132,18 +132,18 @@ def declared(row: NDArray, record: FlightRecord, values: dict[str, FloatArray], 
     values |= corrected
     notes.extend(told)
     for name, lag in (("airspeed", "pitot_lag"), ("alpha", "vane_lag")):
-        stated = name in known.lags or "lag" in _table(sensors, name)
+        stated = name in known.lags or "lag" in table_of(sensors, name)
         late = known.lag(name) if stated else lateness(float(row[lag][0]), STEP)
         if stated or abs(dt - STEP) > 1e-6:
             row[lag] = time_constant(late, dt)
         notes.extend([f"{name} late by {1e3 * late:.3g} ms, as declared"] if stated else [])
-    if "beta" in values and "lag" in _table(sensors, "beta"):
+    if "beta" in values and "lag" in table_of(sensors, "beta"):
         vane = lateness(float(row["vane_lag"][0]), dt)
         extra = known.lag("beta") - vane  # the model's vanes are alike
         values["beta"] = values["beta"] + (extra * rate(values["beta"], dt, abs(extra)) if extra else 0.0)
-    if "bending" in _table(sensors, "alpha"):
+    if "bending" in table_of(sensors, "alpha"):
         row["boom_gain"] = known.bending
-    if _table(sensors, "thrust").get("found"):
+    if table_of(sensors, "thrust").get("found"):
         notes.append("thrust taken as measured: it is another function of torque and airspeed than in the references")
     _recorder(row, sensors, values, dt, notes)
 
@@ -154,14 +154,14 @@ def thrust_was_measured(record: FlightRecord) -> bool:
     Raises:
         InputError: another source.
     """
-    source = _table(record.meta.sensors, "thrust").get("source", "computed")
+    source = table_of(record.meta.sensors, "thrust").get("source", "computed")
     if source not in ("measured", "computed"):
         raise InputError(f"sensors.thrust.source must be measured or computed, got {source!r}")
     return bool(source == "measured")
 
 
 def _recorder(row: NDArray, sensors: Any, values: dict[str, FloatArray], dt: float, notes: list[str]) -> None:
-    table = _table(sensors, "filter")
+    table = table_of(sensors, "filter")
     for key in ("lag", "frequency", "order"):
         value = table.get(key, 0.0)
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
@@ -185,6 +185,7 @@ def _recorder(row: NDArray, sensors: Any, values: dict[str, FloatArray], dt: flo
         values |= {n: in_first_order(values[n], cut, order, first, dt) for n in PASSED if n in values}
 
 
-def _table(sensors: Any, name: str) -> Any:
+def table_of(sensors: Any, name: str) -> Any:
+    """What a side file's `sensors` tells of one instrument, by word; empty where that is no table."""
     entry = sensors.get(name, {})
     return entry if isinstance(entry, dict) else {}

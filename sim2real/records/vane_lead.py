@@ -19,7 +19,7 @@ from scipy.signal import lfilter, savgol_filter
 from icing_env.atmosphere import G0, density
 from icing_env.record import FloatArray
 from sim2real.records.channels import MEASURED
-from sim2real.records.instruments import lateness
+from sim2real.records.instruments import lateness, table_of
 from sim2real.records.late_power import CLEAR, SPAN, until_none_is_left
 from sim2real.records.reconstruct import Reconstruction
 
@@ -46,8 +46,7 @@ def _declared(flights: Sequence[Reconstruction]) -> float | None:
     """
     places = set()
     for flight in flights:
-        entry = flight.record.meta.sensors.get("alpha")
-        place = entry.get("position") if isinstance(entry, dict) else None
+        place = table_of(flight.record.meta.sensors, "alpha").get("position")
         ahead = place[0] if isinstance(place, list | tuple) and len(place) == 3 else None
         places.add(float(ahead) if isinstance(ahead, int | float) else None)
     return places.pop() if len(places) == 1 else None
