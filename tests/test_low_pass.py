@@ -80,3 +80,5 @@ def test_a_record_that_declares_one_is_brought_there_but_for_its_attitudes() -> 
     assert all(np.any(second.positions[s] != silent.positions[s]) for s in SURFACES)
     cut, j = float(second.parameters["filter_frequency"][0]), MEASURED.index("q")
     assert np.array_equal(second.measured[:, j], in_first_order(silent.measured[:, j], 5.0, 2, cut, second.dt))
+    assert [any("brought to one of first order" in note for note in flight.notes)
+            for flight in (silent, second, *others)] == [False, True, False, False]  # fmt: skip

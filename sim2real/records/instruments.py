@@ -177,10 +177,12 @@ def _recorder(row: NDArray, sensors: Any, values: dict[str, FloatArray], dt: flo
     else:
         return
     row["filter_frequency"] = 1.0 / (2.0 * math.pi * time_constant(late, dt)) if late > 0.0 else UNFILTERED
+    higher = order > 1 and cut > 0.0
     if table:
         how = "attitudes tell" if table.get("found") else "declared"
-        notes.append(f"low pass of the recorder late by {1e3 * late:.3g} ms, as {how}")
-    if order > 1 and cut:
+        brought = ", brought to one of first order" if higher else ""
+        notes.append(f"low pass of the recorder late by {1e3 * late:.3g} ms, as {how}{brought}")
+    if higher:
         first = float(row["filter_frequency"][0])
         values |= {n: in_first_order(values[n], cut, order, first, dt) for n in PASSED if n in values}
 
