@@ -124,6 +124,20 @@ def test_a_published_set_is_scored_as_the_folder_was(tmp_path):
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["a.tar.xz"]
 
 
+def test_probabilities_are_published_whole_and_the_rest_short(tmp_path):
+    folder = a_set(tmp_path / "a", 2, 0)
+    path = folder / "answers" / "a000.json"
+    told = json.loads(path.read_text())
+    told["hypotheses"][0]["probability"] = 0.1234567891234
+    places = {"components": {"x_force": 0.98765432}}
+    path.write_text(json.dumps(told | {"gap": {"after": 0.1234567891234}, "where": places}))
+    publish(folder, tmp_path / "a.tar.xz")
+    restored = json.loads((unpack(tmp_path / "a.tar.xz", tmp_path / "b") / "answers" / path.name).read_text())
+    assert restored["hypotheses"] == told["hypotheses"]
+    assert restored["where"] == places
+    assert restored["gap"] == {"after": 0.123457}
+
+
 def test_effects_left_out_of_the_library_are_published_and_scored_too(tmp_path):
     folder = a_set(tmp_path / "a", 2, 1)
     left_out = removals(folder / "keys")

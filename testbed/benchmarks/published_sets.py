@@ -1,7 +1,8 @@
 """A set that has been scored, in one file that anybody can score again: answers, keys, gaps flown again, manifest.
 
-Answers are kept to DIGITS figures and without the map of where residuals lie, which no figure needs. Keys and manifest
-are as they were. Records are not in it, but the seed is: `testbed.withheld.generate` draws them again beside the keys.
+Answers are kept without the map of where residuals lie, and what no score reads to DIGITS figures: probabilities that
+agree to so many would fall into other bins than they did. Keys and manifest are as they were. Records are not in it,
+but the seed is: `testbed.withheld.generate` draws them again beside the keys.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from testbed.withheld.files import write_text
 
 PARTS = ("answers", "keys", "refly")
 WITHOUT = "answers_without"  # to single effects left out of the library: a part of sets where that was asked
-DIGITS = 6
+DIGITS, WHOLE = 6, ("hypotheses", "effects", "where", "seconds")
 MEMBER = re.compile(rf"manifest\.json|(?:{'|'.join((*PARTS, WITHOUT))})/\w+\.json")
 LARGEST = 10**7  # bytes of one member
 
@@ -40,7 +41,10 @@ def publish(folder: Path, path: Path) -> None:
 
 
 def _shortened(path: Path) -> bytes:
-    answer = json.loads(path.read_text(encoding="utf-8"), parse_float=lambda text: float(f"{float(text):.{DIGITS}g}"))
+    text = path.read_text(encoding="utf-8")
+    whole = json.loads(text)
+    answer = json.loads(text, parse_float=lambda number: float(f"{float(number):.{DIGITS}g}"))
+    answer |= {part: whole[part] for part in WHOLE if part in whole}
     if "where" in answer:
         answer["where"] = {"components": answer["where"]["components"]}
     return json.dumps(answer).encode()
