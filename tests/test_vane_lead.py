@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from sim2real.diagnosis import _reconstructed, diagnose
 from sim2real.records.channels import MEASURED
 from sim2real.records.reconstruct import Reconstruction, reconstruct
-from sim2real.records.vane_lead import boom_of_vanes, motion
+from sim2real.records.vane_lead import _ago, boom_of_vanes, met_together, motion
 from testbed.withheld import instruments
 from testbed.withheld import plant as pl
 from testbed.withheld.conditions import Conditions
@@ -23,8 +23,11 @@ from testbed.withheld.published import PUBLISHED
 BOOM = 5.6  # m
 
 
-def flown(folder, sigma: float, boom: float, count: int = DIAGNOSED) -> list:
-    """Records of the generator's plant, its vanes `boom` m ahead of the centre of gravity in the gusts."""
+def flown(folder, sigma: float, boom: float, count: int = DIAGNOSED, noise: float = 1.0) -> list:
+    """Records of the generator's plant, its vanes `boom` m ahead of the centre of gravity in the gusts.
+
+    `noise`: times the instruments' own.
+    """
     out = []
     for i, manoeuvre in enumerate(PLANS[2][:count]):
         rng = np.random.default_rng([7, i])
@@ -35,7 +38,7 @@ def flown(folder, sigma: float, boom: float, count: int = DIAGNOSED) -> list:
             now = gust[:: pl.SUB, column]
             there = np.append(gust[ahead:, column], np.repeat(gust[-1, column], ahead))[:: pl.SUB]
             channels[name] = channels[name] + late((now - there) / manoeuvre.speed)
-        seen = instruments.read(channels, 1.0, rng)
+        seen = instruments.read(channels, noise, rng)
         out.append(written(folder / f"{i}", seen, flight.commands))
     return out
 
@@ -69,6 +72,43 @@ def test_a_boom_that_is_told_is_as_long_as_declared(tmp_path, place, taken):
     records = [replace(record, meta=replace(record.meta, sensors={**record.meta.sensors, "alpha": entry}))
                for record in flown(tmp_path, 0.5, BOOM)]
     assert all(any(taken in note for note in flight.notes) for flight in _reconstructed(records, None, None))
+
+
+@pytest.mark.parametrize("samples", [0.3, 0.87, 1.0, 1.49, 4.38, 4.999, 5.0])
+def test_some_samples_ago_a_gust_is_what_it_was_and_white_noise_as_strong(samples):
+    t, noise = np.arange(4000) * 0.02, np.random.default_rng(3).standard_normal(4000)
+    for hertz, off in ((0.5, 1e-4), (2.0, 3e-3)):
+        wave = np.sin(2.0 * np.pi * hertz * t)
+        assert _ago(wave, samples)[500:] == pytest.approx(np.sin(2.0 * np.pi * hertz * (t - samples * 0.02))[500:],
+                                                          abs=off)  # fmt: skip
+    then = _ago(noise, samples)
+    assert np.std(then) == pytest.approx(np.std(noise), rel=0.03)
+    assert abs(np.corrcoef(then[1:], then[:-1])[0, 1]) < 0.05
+    assert _ago(np.full(9, 0.3), samples) == pytest.approx(0.3)
+
+
+def test_angles_at_the_centre_of_gravity_are_those_that_it_meets(tmp_path_factory):
+    """Not some milliseconds later: a gust's lift would be early to a filter, and its vanes too quiet."""
+    entry, made = {"position": [BOOM, 0.0, 0.0], "corrected": True}, tmp_path_factory.mktemp
+    ahead = [replace(record, meta=replace(record.meta, sensors={**record.meta.sensors, "alpha": entry}))
+             for record in flown(made("ahead"), 1.5, BOOM, noise=0.05)]
+    there = [reconstruct(record) for record in flown(made("there"), 1.5, 0.0, noise=0.05)]
+    taken = met_together([reconstruct(record) for record in ahead])
+    assert noted(taken)
+    for one, other in zip(taken, there, strict=True):
+        assert one.parameters["vane_lag"] == other.parameters["vane_lag"]
+        late = lateness_between(one.channel("alpha"), other.channel("alpha"), other.dt)
+        assert abs(late) < 2.5e-3
+
+
+def lateness_between(one: np.ndarray, other: np.ndarray, dt: float) -> float:
+    """By how much one is later than the other between 1 and 3 Hz, s."""
+    hertz = np.fft.rfftfreq(len(one), dt)
+    inside = (hertz >= 1.0) & (hertz < 3.0)
+    a, b = (np.fft.rfft((x - x.mean()) * np.hanning(len(x)))[inside] for x in (one, other))
+    delays = np.linspace(-0.02, 0.02, 401)
+    fits = np.real(np.exp(2j * np.pi * hertz[inside] * delays[:, None]) @ (a * np.conj(b)))
+    return float(delays[np.argmax(fits)])
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.5, 1.5])

@@ -9,6 +9,7 @@ ago, and what the motion has changed since.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -93,20 +94,26 @@ def motion(flight: Reconstruction) -> tuple[FloatArray, FloatArray]:
             p * sa - r * ca + (y - along * sb) / (V * cb))
 
 
-def _at_centre(flight: Reconstruction, lead: float) -> tuple[dict[str, FloatArray], float]:
-    """Flow angles of some samples ago and what the motion has changed since, and by how much more they are late, s.
-
-    Whole samples, lest noise between two of them is less than at them; what is left of the last one is a vane's lag.
-    """
-    samples = int(np.ceil(lead / flight.dt - 1e-9))
-    more, lag = samples * flight.dt - lead, float(flight.parameters["vane_lag"][0])
+def _at_centre(flight: Reconstruction, lead: float) -> dict[str, FloatArray]:
+    """Flow angles of some time ago and what the motion has changed since."""
     out = {}
     for name, own in zip(("alpha", "beta"), motion(flight), strict=True):
         turned = cumulative_trapezoid(own, dx=flight.dt, initial=0.0)
-        air = flight.channel(name) - _behind(turned, lag, flight.dt)
-        before = np.clip(np.arange(len(air)) - samples, 0, len(air) - 1)
-        out[name] = air[before] + _behind(turned, lag + more, flight.dt)
-    return out, more
+        turned = _behind(turned, float(flight.parameters["vane_lag"][0]), flight.dt)
+        out[name] = _ago(flight.channel(name) - turned, lead / flight.dt) + turned
+    return out
+
+
+def _ago(values: FloatArray, samples: float) -> FloatArray:
+    """Values some samples ago, as they began before.
+
+    Between two samples by an all-pass (Thiran, IEEE Transactions on Circuit Theory 18(6), 1971): white noise stays
+    white and as strong, which a mean of the two would lessen, and so does a gust, which a lag would.
+    """
+    whole = max(math.floor(samples - 0.5), 0)
+    before = values[np.clip(np.arange(len(values)) - whole, 0, len(values) - 1)]
+    a = (1.0 + whole - samples) / (1.0 - whole + samples)
+    return np.asarray(values[0] + lfilter([a, 1.0], [1.0, a], before - values[0]))
 
 
 def _behind(angle: FloatArray, lag: float, dt: float) -> FloatArray:
@@ -117,11 +124,9 @@ def _behind(angle: FloatArray, lag: float, dt: float) -> FloatArray:
 
 def _later(flight: Reconstruction, boom: float, how: str = "") -> Reconstruction:
     """The record with flow angles at the centre of gravity, none where it had none."""
-    measured, row = flight.measured.copy(), flight.parameters.copy()
-    angles, more = _at_centre(flight, _lead(flight, boom))
-    for name, angle in angles.items():
+    measured = flight.measured.copy()
+    for name, angle in _at_centre(flight, _lead(flight, boom)).items():
         column = MEASURED.index(name)
         measured[:, column] = np.where(np.isfinite(measured[:, column]), angle, np.nan)
-    row["vane_lag"] = row["vane_lag"] + more
-    return replace(flight, measured=measured, parameters=row, notes=(
+    return replace(flight, measured=measured, notes=(
         *flight.notes, f"vanes meet gusts {boom:.1f} m before the wings{how}: taken at the centre of gravity"))
