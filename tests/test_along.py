@@ -12,6 +12,7 @@ from sim2real.library.candidates import bank
 from sim2real.library.terms import pushes
 from sim2real.prediction.along import REST
 from sim2real.prediction.correction import STATES
+from sim2real.prediction.gusts import Kind
 from sim2real.prediction.predictor import Predictor, Push
 from sim2real.records.channels import MEASURED, SURFACES
 from sim2real.records.powers import thrust_per_power
@@ -136,3 +137,16 @@ def test_rows_that_share_parameters_are_not_flown(flight: Reconstruction) -> Non
     shared.place(0)
     with pytest.raises(ValueError, match="3 rows need a PARAMETERS row each"):
         shared.fly(1)
+
+
+@pytest.mark.parametrize(("rotation", "alike"), [(1.0, True), (0.0, False)])
+def test_air_that_turns_is_met_at_the_records_speed(flight: Reconstruction, rotation: float, alike: bool) -> None:
+    """Whatever the airspeed of a row: gains and noise are of one speed, and most gusts are drawn for one."""
+    rows = np.repeat(flight.parameters, 2)
+    plant = Predictor(flight, rows, kind=Kind(tail_delay=rotation == 0.0, rotation=rotation == 1.0))
+    plant.place(0)
+    plant.fleet.state["u"][1] += 15.0
+    plant.fleet.state["dryden_w1"] = 1.0
+    plant.fly(50)
+    gust = plant.fleet.state["gust_q" if rotation else "gust_w_tail"]
+    assert gust[0] != 0.0 and (gust[0] == pytest.approx(gust[1], rel=1e-9)) == alike

@@ -19,6 +19,7 @@ from icing_env.parameters import as_bytes
 from icing_env.record import FloatArray
 from icing_env.simulate import Fleet
 from sim2real.prediction.along import along
+from sim2real.prediction.gusts import met
 from sim2real.prediction.kalman import Gain
 from sim2real.prediction.predictor import Push, held, listed, lost, put, spare, started, steered, stretch, substeps
 from sim2real.records.channels import MEASURED
@@ -62,6 +63,7 @@ class _EndToEnd:
         self.flights, self.own = flights, own
         self.first = np.cumsum([0, *(len(f.time) for f in flights)])
         self.controls = np.concatenate([steered(f) for f in flights])
+        self.met = np.array([met(f) for f in flights])
         self.measured = np.concatenate([f.measured for f in flights])
         self.stretch = [stretch(f) for f in flights]
         still = [np.zeros((len(f.time), 6)) if f.known is None else f.known for f in flights]
@@ -95,7 +97,7 @@ class _EndToEnd:
         forces, errors = listed([replace(q, row=q.row - first) for q in pushes
                                  if first <= q.row < first + len(of)], dt)  # fmt: skip
         out = np.empty((steps, len(of), len(MEASURED)))
-        along(fleet.table(), self.controls, self.first[of], self.first[of + 1] - 1, self.measured,
+        along(fleet.table(), self.controls, self.met[of], self.first[of], self.first[of + 1] - 1, self.measured,
               np.array(self.stretch)[of], self.gain, *forces, *errors, self.known, out)
         return out
 

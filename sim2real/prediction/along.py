@@ -146,18 +146,20 @@ def advance(block: Any, states: Any, parameters: Any, speeds: Any, count: int, d
     feel_block(block, count)
     for j in range(count):
         copy(states[j], lane(block, NOW, j, CONTINUOUS))
-        speeds[j] = lane(block, AT_AIR, j, AIR).airspeed
+        if parameters[j].turbulence_rotation == 0.0:
+            speeds[j] = lane(block, AT_AIR, j, AIR).airspeed
 
 
 @entry
-def along(table: Any, controls: Any, first: Any, last: Any, measured: Any, stretch: Any, gain: Any, force_at: Any,
-          force: Any, error_at: Any, error: Any, known: Any, out: Any) -> None:
+def along(table: Any, controls: Any, turning: Any, first: Any, last: Any, measured: Any, stretch: Any, gain: Any,
+          force_at: Any, force: Any, error_at: Any, error: Any, known: Any, out: Any) -> None:
     """Fly the rows of a fleet (`table`: of `Fleet.table`) along records put end to end, LANES at a time.
 
     Nothing draws noise but gusts with an intensity above STILL; ice stays as it is.
 
     Args:
         controls: [N, CONTROLS].
+        turning: speed at which each row meets air that turns, m/s [n] (`gusts.met`).
         first, last: samples at which each row starts, and the last of its own record, where it stays [n].
         measured: [N, channels of MEASURED], nan where nothing was measured.
         stretch: by which a fed-back channel's error is multiplied [n, FED_BACK].
@@ -179,7 +181,7 @@ def along(table: Any, controls: Any, first: Any, last: Any, measured: Any, stret
     block, speeds = np.zeros(ROWS*LANES), np.zeros(len(x))
     fed, change, scratch = np.zeros(FED_BACK*LANES), np.zeros(CHANGED*LANES), np.zeros(CHANGED)
     for i in range(len(x)):
-        speeds[i] = outcomes[i].airspeed
+        speeds[i] = outcomes[i].airspeed if parameters[i].turbulence_rotation == 0.0 else turning[i]
     for at in range(0, len(x), LANES):
         count = min(LANES, len(x) - at)
         for j in range(count):

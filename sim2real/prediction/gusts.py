@@ -74,6 +74,16 @@ class Gusts(NamedTuple):
         return _rolling(self.sigma, speed, height, self.span(flight))[0] if self.kind.rotation else 0.0
 
 
+def met(flight: Reconstruction) -> float:
+    """Speed at which a record meets air that turns, m/s: its typical one, of which gains and noise are, too.
+
+    An aircraft that changes its speed meets a frozen field faster or more slowly; but who draws gusts mostly draws them
+    for one speed, and what they turn of the air less than they were taken to, as the airspeed rises, is a pitching
+    moment over time, of 1e-4 in 1.5 m/s, that slow innovations show.
+    """
+    return _typical(flight)[0]
+
+
 def _typical(flight: Reconstruction) -> tuple[float, float]:
     return float(np.median(flight.channel("airspeed"))), float(np.median(flight.altitude))
 

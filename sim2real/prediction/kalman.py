@@ -16,7 +16,7 @@ import numpy as np
 from icing_env.jit import entry
 from icing_env.record import FloatArray
 from sim2real.prediction.correction import ROTATION
-from sim2real.prediction.gusts import LATER, Gusts, Kind
+from sim2real.prediction.gusts import LATER, Gusts, Kind, met
 from sim2real.prediction.predictor import TANGENT, Predictor, stretch
 from sim2real.prediction.readings import ALTITUDE, apart, read_share, unread
 from sim2real.prediction.within_steps import as_met, within_steps
@@ -98,6 +98,8 @@ def linearise(flight: Reconstruction, spans: Sequence[slice] = (slice(None),), k
         flown.fleet.state[name][2 * n + 2 * j + 1 :: each] -= step
     for surface in SURFACES:
         flown.fleet.command[surface] = flown.fleet.state[surface]
+    if kind.rotation:
+        flown.fleet.outcome["airspeed"] = met(flight)
     flown.fleet.step()
     y, z = flown.read().reshape(m, each, -1), flown.tangent().reshape(m, each, -1)
     A = np.swapaxes((z[:, :n] - z[:, n : 2 * n]) / (2.0 * size[:, None]), 1, 2)

@@ -25,7 +25,7 @@ from icing_env.simulate import Fleet
 from icing_env.types import STATE
 from sim2real.prediction.along import CONTROLS, SLOW_SURFACE, STILL, along, read
 from sim2real.prediction.correction import STATES, X, columns, turn
-from sim2real.prediction.gusts import LATER, Kind
+from sim2real.prediction.gusts import LATER, Kind, met
 from sim2real.records.channels import FED_BACK, MEASURED, SURFACES
 from sim2real.records.instruments import STEP
 from sim2real.records.reconstruct import Reconstruction
@@ -102,9 +102,9 @@ class Predictor:
         start = np.full(self.n, first, np.intp) if isinstance(first, int) else np.asarray(first, np.intp)
         K = np.zeros((0, 0, 0, 0)) if gain is None else gain[None] if gain.ndim == 3 else gain
         forces, errors = listed(pushes, flight.dt)
-        along(self.fleet.table(), steered(flight), start, np.full(self.n, len(flight.time) - 1),
-              np.ascontiguousarray(flight.measured), np.tile(stretch(flight), (self.n, 1)),
-              np.ascontiguousarray(np.swapaxes(K, 2, 3)), *forces, *errors,
+        along(self.fleet.table(), steered(flight), np.full(self.n, met(flight)), start,
+              np.full(self.n, len(flight.time) - 1), np.ascontiguousarray(flight.measured),
+              np.tile(stretch(flight), (self.n, 1)), np.ascontiguousarray(np.swapaxes(K, 2, 3)), *forces, *errors,
               np.zeros((0, 6)) if flight.known is None else flight.known, out)
         return out
 
