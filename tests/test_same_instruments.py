@@ -11,11 +11,10 @@ from generated import in_still_air
 from icing_env import scenario
 from icing_env.aircraft import load
 from icing_env.record import FlightRecord, RecordMeta
-from sim2real.baseline.loading import CENTRE, of_another_loading, of_published, otherwise_loaded
-from sim2real.baseline.references import REPEATABLE, Baseline, _baseline, directions, fit_baseline, uncertain
+from sim2real.baseline.loading import CENTRE, INERTIA, of_another_loading, of_published, otherwise_loaded
+from sim2real.baseline.references import REPEATABLE, Baseline, _baseline, directions, uncertain
 from sim2real.diagnosis import diagnose
 from sim2real.library.candidates import (
-    INERTIAS,
     INSTRUMENTS,
     RIGGING,
     SIGNED,
@@ -26,7 +25,6 @@ from sim2real.library.candidates import (
     nuisances,
     shifted,
 )
-from sim2real.records.reconstruct import reconstruct
 from testbed.flight import fly
 from testbed.withheld.flights import Aircraft
 
@@ -58,29 +56,6 @@ def test_a_number_that_one_source_tells_may_be_another_without_a_gap(tmp_path, n
     within, beyond = (Aircraft(baseline={number: 1.0 + times * TOLD_ONCE[number]}) for times in (-1.2, far))
     assert diagnose(in_still_air(tmp_path, "diagnose", within, 4)).verdict == "no_gap"
     assert diagnose(in_still_air(tmp_path, "diagnose", beyond, 4)).verdict != "no_gap"
-
-
-@pytest.mark.parametrize(("times", "gap"), [(2.0, False), (12.0, True)])
-def test_inertias_are_off_by_what_a_loading_leaves_without_a_gap(tmp_path, times, gap):
-    """They turn the aircraft by its rates too, which no derivative does: one of 2.4 % was a gap in still air (0.93)."""
-    own = Aircraft(baseline={"inertia_xx": 1.0 - 0.02 * times, "inertia_zz": 1.0 + 0.02 * times})
-    found = diagnose(in_still_air(tmp_path, "diagnose", own, 4))
-    assert (found.verdict != "no_gap") == gap, found.hypotheses[:3]
-
-
-def test_references_tell_what_side_files_are_off_by_in_inertias(tmp_path):
-    """Records have inertias of their own side files, off by the same part."""
-    own = Aircraft(baseline={"inertia_xx": 1.06, "inertia_yy": 0.95})
-    clean, again = (in_still_air(tmp_path, role, own, seed) for role, seed in (("reference", 1), ("diagnose", 2)))
-    assert diagnose(again, reference=clean).verdict == "no_gap"
-    fitted = fit_baseline([reconstruct(record) for record in clean], bank((), uncertain()))
-    published = load()
-    parts = {name: float(fitted.parameters[name][0] / published[name][0]) for name in INERTIAS}
-    assert 1.0 < parts["inertia_xx"] < 1.08 and 0.93 < parts["inertia_yy"] < 1.0  # derivatives take the rest
-    (record,) = clean[:1]
-    lighter = replace(record, meta=replace(record.meta, inertia=tuple(0.9 * value for value in record.meta.inertia)))
-    row = reconstruct(lighter, fitted.near(lighter)).parameters
-    assert row["inertia_xx"][0] == pytest.approx(parts["inertia_xx"] * lighter.meta.inertia[0])
 
 
 def flown(off: dict[str, float]) -> FlightRecord:
@@ -154,13 +129,11 @@ def test_a_loading_is_another_one_where_masses_say_so(one, other, otherwise):
 
 
 def test_the_published_model_is_as_uncertain_of_a_loading():
-    """A c.g. that papers tell moves the moments' derivatives together, as no spread of single ones does."""
+    """Inertias and c.g. that papers tell move the moments' derivatives together, as no spread of single ones does."""
     moves = nuisances()
     covariance = np.linalg.inv(of_published(moves).precision)
     at = {move.name: j for j, move in enumerate(moves)}
-    assert covariance[at["Cm_alpha"], at["Cm_q"]] > 0.0 and covariance[at["Cn_beta"], at["Cn_r"]] != 0.0
-    assert covariance[at["Cl_p"], at["Cl_beta"]] == pytest.approx(0.0)  # an inertia is a number of its own
-    assert covariance[at["inertia_xx"], at["inertia_xx"]] == pytest.approx(1.0)
+    assert covariance[at["Cl_p"], at["Cl_beta"]] == pytest.approx((INERTIA / SPREAD) ** 2)
     assert covariance[at["CZ_alpha"], at["Cm_q"]] == pytest.approx(0.0)
     assert covariance[at["CZ_alpha"], at["CZ_alpha"]] == pytest.approx(1.0)
 
@@ -172,7 +145,6 @@ def test_another_loading_leaves_moments_uncertain_and_forces_as_they_were():
     sd = dict(zip(names, np.sqrt(np.diag(np.linalg.inv(of_another_loading(known, moves).precision))), strict=True))
     p = known.parameters[0]
     moved = CENTRE / p["chord"] * p["CZ_alpha"] / (SPREAD * p["Cm_alpha"])
-    assert sd["Cm_alpha"] == pytest.approx(abs(moved), rel=1e-3)
-    assert sd["Cl_p"] == pytest.approx(1e-3)
-    assert [sd[name] for name in INERTIAS] == pytest.approx([1.0, 1.0, 1.0], rel=1e-3)
+    assert sd["Cm_alpha"] == pytest.approx(np.hypot(moved, INERTIA / SPREAD), rel=1e-3)
+    assert sd["Cl_p"] == pytest.approx(INERTIA / SPREAD, rel=1e-3)
     assert sd["CZ_alpha"] == pytest.approx(1e-3) and sd["bias_alpha"] == pytest.approx(1e-3)

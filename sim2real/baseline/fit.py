@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from icing_env.record import FloatArray
 from sim2real.baseline.inadequacy import WALKS, walk
-from sim2real.library.candidates import INERTIAS, INSTRUMENTS, NUISANCE_STEP, Bank, Nuisance
+from sim2real.library.candidates import INSTRUMENTS, NUISANCE_STEP, Bank, Nuisance
 from sim2real.prediction.gusts import LATER, Kind
 from sim2real.prediction.kalman import Gain, follow
 from sim2real.records.reconstruct import Inadequacy, Reconstruction
@@ -38,8 +38,8 @@ ROUNDS, SETTLED = 10, 4.0  # flown steps, and the whitened length of one that en
 AGAIN = 2  # the round after which gust intensities are chosen anew at every step: what does not fit passes for gusts
 LONGEST = 40.0  # standard deviations that a step may move a number
 CHANGES = 1.0  # prior standard deviation of that change at twice the dynamic pressure, in that of the value (assumed)
-ALIKE = (*INSTRUMENTS, "spool_time", *INERTIAS)  # in all flights
-STEADY = 1e-3  # the change with the flight condition of what an instrument, a path or a loading has
+ALIKE = (*INSTRUMENTS, "spool_time")  # in all flights
+STEADY = 1e-3  # the change with the flight condition of what an instrument or a path has
 
 
 def in_any_gusts(flights: Sequence[Reconstruction], moves: Sequence[Nuisance], at: FloatArray) -> Fit:

@@ -1,8 +1,8 @@
 """Loading: what neither a published model nor reference flights tell of a flight with its own fuel and freight aboard.
 
 Weighing and fuel gauges leave the centre of gravity and the inertias of every loading uncertain. Moments about another
-centre of gravity are those of Etkin & Reid (Dynamics of Flight, 1996, appendix B.12): Cm + (dx/c) CZ, Cn - (dx/b) CY.
-Inertias that are off by a share are nuisances as they are: they turn the aircraft by its rates too.
+centre of gravity are those of Etkin & Reid (Dynamics of Flight, 1996, appendix B.12): Cm + (dx/c) CZ, Cn - (dx/b) CY;
+an inertia that is off by a share leaves all coefficients of its axis off by as much.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from icing_env import aircraft
 from icing_env.record import FlightRecord, FloatArray
 from sim2real.baseline.references import Baseline
-from sim2real.library.candidates import INERTIAS, Nuisance
+from sim2real.library.candidates import Nuisance
 
-CENTRE = 0.01  # m forward: how well a loading is known (assumed: half a per cent of the chord)
+CENTRE, INERTIA = 0.01, 0.02  # m forward; share: how well a loading is known (assumed: half a per cent of the chord)
 ALIKE = 2e-3  # share of the mass up to which two loadings are one
+AXES = ("Cl_", "Cm_", "Cn_")
 RATIO = "Cm_elevator_CT"  # of two moments of one loading
 
 
@@ -32,33 +33,28 @@ def otherwise_loaded(references: Iterable[FlightRecord], records: Iterable[Fligh
 
 def of_published(nuisances: Sequence[Nuisance]) -> Baseline:
     """The published model, of an aircraft that is loaded as its side file says."""
-    published = Baseline(aircraft.load(), np.eye(len(nuisances)))
-    return _less_known(published, _of_centre(published.parameters, nuisances))
+    return of_another_loading(Baseline(aircraft.load(), np.eye(len(nuisances))), nuisances)
 
 
 def of_another_loading(baseline: Baseline, nuisances: Sequence[Nuisance]) -> Baseline:
     """A baseline as it is known of flights whose loading is told by weighing and gauges alone."""
-    of_inertias = [np.eye(len(nuisances))[j] for j, nuisance in enumerate(nuisances) if nuisance.name in INERTIAS]
-    return _less_known(baseline, _of_centre(baseline.parameters, nuisances), *of_inertias)
-
-
-def _less_known(baseline: Baseline, *moves: FloatArray) -> Baseline:
-    """The baseline with nuisances uncertain by some moves too, each of one standard deviation [n]."""
-    together = np.array(moves)
-    precision = np.linalg.inv(np.linalg.inv(baseline.precision) + together.T @ together)
+    moves = _moves(baseline.parameters, nuisances)
+    covariance = np.linalg.inv(baseline.precision) + moves.T @ moves
+    precision = np.linalg.inv(covariance)
     return replace(baseline, precision=0.5 * (precision + precision.T))
 
 
-def _of_centre(row: NDArray, nuisances: Sequence[Nuisance]) -> FloatArray:
-    """What a standard deviation of the centre of gravity moves the nuisances by [n]."""
-    p, out = row[0], np.zeros(len(nuisances))
+def _moves(row: NDArray, nuisances: Sequence[Nuisance]) -> FloatArray:
+    """What a standard deviation of the centre of gravity, and of each inertia, moves the nuisances by [4, n]."""
+    p, out = row[0], np.zeros((1 + len(AXES), len(nuisances)))
     for j, nuisance in enumerate(nuisances):
         axis, _, of = nuisance.parameter.partition("_")
-        size = nuisance.factor * float(p[nuisance.parameter]) if axis in ("Cm", "Cn") else 0.0
-        if nuisance.absolute or nuisance.parameter == RATIO or not size:
+        if nuisance.absolute or f"{axis}_" not in AXES or nuisance.parameter == RATIO:
             continue
-        if axis == "Cm":
-            out[j] = CENTRE / float(p["chord"]) * float(p[f"CZ_{of}"]) / size
-        elif f"CY_{of}" in (row.dtype.names or ()):
-            out[j] = -CENTRE / float(p["span"]) * float(p[f"CY_{of}"]) / size
+        out[1 + AXES.index(f"{axis}_"), j] = INERTIA / nuisance.factor
+        size = nuisance.factor * float(p[nuisance.parameter])
+        if axis == "Cm" and size:
+            out[0, j] = CENTRE / float(p["chord"]) * float(p[f"CZ_{of}"]) / size
+        if axis == "Cn" and size and f"CY_{of}" in (row.dtype.names or ()):
+            out[0, j] = -CENTRE / float(p["span"]) * float(p[f"CY_{of}"]) / size
     return out

@@ -13,7 +13,7 @@ from icing_env import aircraft
 from icing_env.record import FlightRecord, FloatArray
 from sim2real.baseline.fit import in_any_gusts, possible
 from sim2real.baseline.inadequacy import clean, colour
-from sim2real.library.candidates import INERTIAS, Bank, Nuisance
+from sim2real.library.candidates import Bank, Nuisance
 from sim2real.prediction.gusts import LATER, Kind
 from sim2real.records.reconstruct import Inadequacy, Reconstruction
 
@@ -84,16 +84,10 @@ def _first(nuisance: Nuisance) -> str:
 
 
 def directions(candidates: Bank) -> tuple[Nuisance, ...]:
-    """What is fitted: the candidates' nuisances in steps of the published numbers' size, then those of BEYOND.
-
-    Inertias are what part of them side files, which tell them flight by flight, are off by.
-    """
+    """What is fitted: the candidates' nuisances in steps of the published numbers' size, then those of BEYOND."""
     row = aircraft.load()[0]
     out = []
     for nuisance in candidates.nuisances:
-        if nuisance.name in INERTIAS:
-            out.append(nuisance)
-            continue
         size = nuisance.factor * (1.0 if nuisance.absolute else abs(float(row[_first(nuisance)])))
         out.append(replace(nuisance, factor=size, absolute=True, only="nowhere" if nuisance.name in FIXED else ""))
     known = {nuisance.name for nuisance in out}
@@ -141,14 +135,13 @@ def _baseline(candidates: Bank, moves: Sequence[Nuisance], x: FloatArray, precis
     for nuisance, size, change in zip(moves, x[:n], x[n:], strict=True):
         if not nuisance.only:
             nuisance.apply(row, 0, "", float(size))
-            if nuisance.absolute:
-                changes |= {name: float(change) * nuisance.factor for name in nuisance.parameter.split("+")}
+            changes |= {name: float(change) * nuisance.factor for name in nuisance.parameter.split("+")}
     whole = np.linalg.inv(precision)
     value, change, across = whole[:n, :n], whole[n:, n:], whole[:n, n:]
     covariance = (value + np.mean(at) * (across + across.T) + np.mean(at**2) * change)[:count, :count]
     unit = np.ones(count)
     for j, (nuisance, move) in enumerate(zip(candidates.nuisances, moves, strict=False)):
-        if move.absolute and not nuisance.absolute:
+        if not nuisance.absolute:
             now = abs(float(row[_first(nuisance)][0])) * nuisance.factor
             unit[j] = max(now / move.factor, LEAST)
     out = np.linalg.inv(covariance / unit[:, None] / unit + REPEATABLE**2 * np.eye(count))

@@ -26,7 +26,6 @@ from sim2real.records.reconstruct import Reconstruction
 # model's own uncertainty. Weak ones differ by more, UIUC's from those of NASA's flights even by factors: by 15 % and
 # 30 % (assumed), and the yawing moment of ailerons has either sign. A record's mass is known to about 1 % (assumed).
 SPREAD, MASS_SPREAD = 0.05, 0.01
-INERTIAS = {f"inertia_{axis}": 0.02 for axis in ("xx", "yy", "zz")}  # as weighing and gauges tell them (assumed)
 WEAK = (dict.fromkeys(("CZ_q", "CZ_elevator", "CY_p", "CY_r", "CY_rudder", "Cn_p"), 0.15)
         | dict.fromkeys(("Cl_r", "Cl_rudder"), 0.3) | {"Cn_aileron": 3.0})  # fmt: skip
 THRUST_SPREAD = 0.3  # of power that was not recorded and is told by the levers (assumed)
@@ -129,17 +128,16 @@ def of_model(directions: Iterable[Nuisance], row: NDArray) -> tuple[Nuisance, ..
 
 
 def nuisances() -> tuple[Nuisance, ...]:
-    """Derivatives by `SPREAD`, loading, what levers or one source tell, instruments and the recorder."""
+    """Derivatives by `SPREAD`, mass, what levers or one source tell, instruments and the recorder."""
     derivatives = [Nuisance(name, name, WEAK.get(name, SPREAD)) for name in DERIVATIVE_NAMES]
     guessed = Nuisance("thrust", "thrust_factor_left+thrust_factor_right", THRUST_SPREAD, only="throttle")
     known = {"vane_lag": VANE_SPREAD, "pitot_lag": PITOT_SPREAD, "boom_gain": BOOM_SPREAD}
     timing = (Nuisance("filter_frequency", "filter_frequency", FILTER_SPREAD),
               *(Nuisance(name, name, spread, True) for name, spread in known.items()))
-    loading = [Nuisance(name, name, spread) for name, spread in (("mass", MASS_SPREAD), *INERTIAS.items())]
     told_once = [Nuisance(name, name, spread) for name, spread in TOLD_ONCE.items()]
     rigged = [Nuisance(name, name, spread, True, follows=False) for name, spread in RIGGING.items()]
     off = [Nuisance(name, name, spread, True, follows=name in PICK_UPS) for name, spread in INSTRUMENTS.items()]
-    every = (*derivatives, *rigged, *loading, guessed, *told_once, *off, *timing)
+    every = (*derivatives, *rigged, Nuisance("mass", "mass", MASS_SPREAD), guessed, *told_once, *off, *timing)
     return of_model(every, aircraft.load())
 
 

@@ -235,7 +235,7 @@ def _sampled(record: FlightRecord, name: str, time: FloatArray, dt: float) -> ND
 
 
 def _airframe(record: FlightRecord, row: NDArray, values: dict[str, FloatArray], notes: list[str]) -> NDArray:
-    """Mass, inertia and geometry of the record where it states them; inertias off by what the model's are."""
+    """Mass, inertia and geometry of the record where it states them."""
     meta = record.meta
     mass = float(np.mean(values["mass"])) if "mass" in values else meta.mass
     if mass:
@@ -243,9 +243,8 @@ def _airframe(record: FlightRecord, row: NDArray, values: dict[str, FloatArray],
     else:
         notes.append(f"mass not stated: {row['mass'][0]:.0f} kg from the aircraft file")
     if meta.inertia:
-        stated = aircraft.load()[0]
         for axis, value in zip(("xx", "yy", "zz", "xz"), meta.inertia, strict=True):
-            row[f"inertia_{axis}"] *= value / float(stated[f"inertia_{axis}"])
+            row[f"inertia_{axis}"] = value
     else:
         notes.append("inertia not stated: from the aircraft file")
     if meta.geometry:
