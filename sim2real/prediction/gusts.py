@@ -85,7 +85,9 @@ def met(flight: Reconstruction) -> float:
 
 
 def _typical(flight: Reconstruction) -> tuple[float, float]:
-    return float(np.median(flight.channel("airspeed"))), float(np.median(flight.altitude))
+    """Airspeed, m/s, and altitude, m."""
+    return flight.once("typical", lambda: (float(np.median(flight.channel("airspeed"))),
+                                           float(np.median(flight.altitude))))  # fmt: skip
 
 
 def _rolling(sigma: float, speed: float, height: float, span: float) -> tuple[float, float]:
