@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
-from scipy.signal import lfilter, savgol_filter
+from scipy.signal import detrend, lfilter, savgol_filter
 
 from icing_env.atmosphere import G0, density
 from icing_env.record import FloatArray
@@ -26,6 +26,7 @@ from sim2real.records.reconstruct import Reconstruction
 
 SMOOTH = 0.2  # s, over which a parabola through alpha tells how it changes
 LEAST, LONGEST, EDGE = 2.0, 12.0, 0.25  # m: shorter booms are left alone, longer ones are none; s
+AGAIN = 3  # times that gusts are told from the motion and the motion from them
 NEEDED = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "ax", "ay", "az")
 
 
@@ -85,13 +86,24 @@ def _spans(flight: Reconstruction, boom: float) -> list[FloatArray]:
 
 
 def motion(flight: Reconstruction) -> tuple[FloatArray, FloatArray]:
-    """Rates of alpha and beta in air that does not change, rad/s (N,): Klein & Morelli (2006), eqs. 10.3 to 10.5."""
+    """Rates of alpha and beta in gusts that do not change, rad/s (N,), from the equations of motion in body axes.
+
+    An aircraft that turns moves its velocity over the ground from one body axis to another (Klein & Morelli, 2006, eqs.
+    3.29): that which it has through the air, but for the gusts. These have body axes in the Dryden model, and of them
+    nothing is moved: 0.3 rad/s of roll in a side gust of 1.5 m/s would make 0.5 mrad of alpha in 85 ms.
+    """
     V, a, b, p, q, r, phi, theta, ax, ay, az = (flight.channel(name) for name in NEEDED)
-    sa, ca, sb, cb = np.sin(a), np.cos(a), np.sin(b), np.cos(b)
-    x, y, z = (ax - G0 * np.sin(theta), ay + G0 * np.cos(theta) * np.sin(phi), az + G0 * np.cos(theta) * np.cos(phi))
-    along = x * ca * cb + y * sb + z * sa * cb
-    return (q - (p * ca + r * sa) * sb / cb + (z * ca - x * sa) / (V * cb),
-            p * sa - r * ca + (y - along * sb) / (V * cb))
+    air = V * np.array([np.cos(a) * np.cos(b), np.sin(b), np.sin(a) * np.cos(b)])
+    pull = G0 * np.array([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)])
+    felt, rates = np.array([ax, ay, az]) + pull, np.array([p, q, r])
+    gust, change = np.zeros_like(air), np.zeros_like(air)
+    for _ in range(AGAIN):
+        change = felt - np.cross(rates, air - gust, axis=0)
+        gust = detrend(air - cumulative_trapezoid(change, dx=flight.dt, initial=0.0))
+    u, v, w = air
+    faster = np.sum(air * change, axis=0) / V
+    return ((u * change[2] - w * change[0]) / (u**2 + w**2),
+            (change[1] - v / V * faster) / np.sqrt(u**2 + w**2))
 
 
 def _at_centre(flight: Reconstruction, lead: float) -> dict[str, FloatArray]:
