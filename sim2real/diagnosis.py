@@ -190,7 +190,7 @@ def _weighed(at_hand: _AtHand, records: Sequence[FlightRecord], held_out: Sequen
     progress("weighing again about an aircraft whose downwash does not lag")
     other = _over(without_lag(at_hand.baseline), at_hand, records, held_out)
     again = fit(other.flights, other.candidates, other.untestable, other.baseline, progress)
-    return (other, again) if plain or simpler(again[1], first[1]) else (at_hand, first)
+    return (other, again) if plain or simpler(again[1], first[1], at_hand.baseline.precision) else (at_hand, first)
 
 
 def _over(baseline: Baseline, before: _AtHand, records: Sequence[FlightRecord], held_out: Sequence[FlightRecord]

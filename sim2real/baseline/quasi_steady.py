@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from icing_env import aircraft
+from icing_env.record import FloatArray
 from sim2real.baseline.references import Baseline
 from sim2real.library.candidates import Bank
 from sim2real.posterior.hypotheses import Posterior
@@ -55,17 +56,28 @@ def worth_trying(posterior: Posterior, baseline: Baseline, candidates: Bank) -> 
     return (best.things > 1 and EFFECT in best.effects) or (best.things > 2 and PITCH in places)
 
 
-def simpler(now: Posterior, before: Posterior) -> bool:
-    """Whether the best explanation has fewer causes, or as many and no unknown one any more.
+def simpler(now: Posterior, before: Posterior, precision: FloatArray) -> bool:
+    """Whether the best explanation has fewer causes, or as many and no unknown one any more, or numbers far less odd.
 
     None that puts the lag back: an aircraft that has it is told about the model that has it. Nor one that leaves far
     more of the records, with noise and gusts judged as that model has them.
+
+    Args:
+        now, before: what is told about the model without the lag, and about the one that has it.
+        precision: of the numbers' prior.
     """
     left, least = (told.best.left * told.tempering for told in (now, before))
-    if left > LOSES * least:
+    if left > LOSES * least or EFFECT in now.best.effects:
         return False
     known = now.best.unknown is None and before.best.unknown is not None
-    return EFFECT not in now.best.effects and now.best.things < before.best.things + known
+    return now.best.things < before.best.things + known or (
+        now.best.things == before.best.things and oddness(now, precision) < oddness(before, precision) - FAR**2)
+
+
+def oddness(posterior: Posterior, precision: FloatArray) -> float:
+    """Square of how far the numbers beside the best explanation are from published ones, in prior deviations."""
+    settled = posterior.best.settled
+    return 0.0 if settled is None else float(settled.nuisances @ precision @ settled.nuisances)
 
 
 def without_lag(baseline: Baseline) -> Baseline:
