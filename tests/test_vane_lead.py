@@ -164,6 +164,19 @@ def test_flow_angles_that_were_not_sampled_stay_so(tmp_path):
     assert np.isnan(flights[0].measured[100:120, MEASURED.index("alpha")]).all()
 
 
+def test_flow_angles_of_a_record_that_does_not_tell_the_motion_stay_as_they_are(tmp_path):
+    """A channel that was not recorded is no zero of it: without az the aircraft would fall."""
+    records = flown(tmp_path, 1.5, BOOM)
+    flights = [reconstruct(record) for record in records]
+    column = MEASURED.index("az")
+    measured = flights[1].measured.copy()
+    measured[:, column] = np.nan
+    flights[1] = replace(flights[1], measured=measured)
+    first, second, *_ = met_together(flights)
+    assert noted([first]) and not noted([second])
+    assert second.channel("alpha") == pytest.approx(flights[1].channel("alpha"), abs=0.0)
+
+
 def test_a_clean_aircraft_with_a_boom_is_not_blamed(tmp_path):
     """Its gusts were of no kind that made sense, and what they did was a vane's, a damping's or unknown."""
     assert diagnose(flown(tmp_path, 1.5, BOOM)).verdict == "no_gap"

@@ -135,7 +135,9 @@ def _behind(angle: FloatArray, lag: float, dt: float) -> FloatArray:
 
 
 def _later(flight: Reconstruction, boom: float, how: str = "") -> Reconstruction:
-    """The record with flow angles at the centre of gravity, none where it had none."""
+    """The record with flow angles at the centre of gravity, none where it had none; as it is without all of NEEDED."""
+    if not all(flight.has(name) for name in NEEDED):
+        return flight
     measured = flight.measured.copy()
     for name, angle in _at_centre(flight, _lead(flight, boom)).items():
         column = MEASURED.index(name)
