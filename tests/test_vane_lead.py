@@ -130,7 +130,7 @@ def test_in_still_air_the_motion_is_all_that_moves_the_flow(tmp_path):
 
 def test_gusts_do_not_turn_with_the_aircraft():
     """They have body axes, as the Dryden model has them: what a roll of 0.3 rad/s would make of a side gust of 1.5 m/s
-    as alpha was taken for motion, 0.2 mrad in the time that a boom of 5.6 m is ahead."""
+    of alpha was taken for motion, 0.6 mrad in the time that a boom of 5.6 m is ahead."""
     t = np.arange(0.0, 40.0, 0.02)
     p, q, r = 0.3 * np.sin(0.9 * t), 0.05 * np.sin(0.6 * t), 0.04 * np.cos(0.7 * t)
     gust = 1.5 * np.array([np.sin(0.5 * t), np.sin(0.8 * t + 1.0), np.sin(1.1 * t)])

@@ -88,9 +88,9 @@ def _spans(flight: Reconstruction, boom: float) -> list[FloatArray]:
 def motion(flight: Reconstruction) -> tuple[FloatArray, FloatArray]:
     """Rates of alpha and beta in gusts that do not change, rad/s (N,), from the equations of motion in body axes.
 
-    An aircraft that turns moves its velocity over the ground from one body axis to another (Klein & Morelli, 2006, eqs.
-    3.29): that which it has through the air, but for the gusts. These have body axes in the Dryden model, and of them
-    nothing is moved: 0.3 rad/s of roll in a side gust of 1.5 m/s would make 0.5 mrad of alpha in 85 ms.
+    In air at rest they are those of Klein & Morelli (2006), eqs. 10.3 to 10.5. What turning moves from one body axis to
+    another is the velocity through the air but for the gusts, which have body axes in the Dryden model, so that of them
+    nothing is moved: 0.3 rad/s of roll in a side gust of 1.5 m/s at 65 m/s would make 0.6 mrad of alpha in 86 ms.
     """
     V, a, b, p, q, r, phi, theta, ax, ay, az = (flight.channel(name) for name in NEEDED)
     air = V * np.array([np.cos(a) * np.cos(b), np.sin(b), np.sin(a) * np.cos(b)])
