@@ -23,9 +23,11 @@ from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
 from testbed.withheld.published import PUBLISHED
 
 BOOM = 5.6  # m
+AIRCRAFT = Aircraft()
 
 
-def flown(folder, sigma: float, boom: float, count: int = DIAGNOSED, noise: float = 1.0) -> list:
+def flown(folder, sigma: float, boom: float, count: int = DIAGNOSED, noise: float = 1.0,
+          aircraft: Aircraft = AIRCRAFT) -> list:  # fmt: skip
     """Records of the generator's plant, its vanes `boom` m ahead of the centre of gravity in the gusts.
 
     `noise`: times the instruments' own.
@@ -34,7 +36,7 @@ def flown(folder, sigma: float, boom: float, count: int = DIAGNOSED, noise: floa
     for i, manoeuvre in enumerate(PLANS[2][:count]):
         rng = np.random.default_rng([7, i])
         gust = turbulence(manoeuvre, Conditions(sigma, 1.0, 1.0, "at_once"), rng)
-        flight, ahead = fly(Aircraft(), manoeuvre, 1.0, gust), round(boom / manoeuvre.speed * pl.SUB / pl.DT)
+        flight, ahead = fly(aircraft, manoeuvre, 1.0, gust), round(boom / manoeuvre.speed * pl.SUB / pl.DT)
         channels = dict(flight.channels)
         for name, column in (("alpha", pl.G_W), ("beta", pl.G_V)):
             now = gust[:: pl.SUB, column]
@@ -116,6 +118,16 @@ def lateness_between(one: np.ndarray, other: np.ndarray, dt: float) -> float:
 @pytest.mark.parametrize("sigma", [0.0, 0.5, 1.5])
 def test_vanes_at_the_centre_of_gravity_are_left_alone(tmp_path, sigma):
     assert not noted(_reconstructed(flown(tmp_path, sigma, 0.0), None, None))
+
+
+@pytest.mark.parametrize("sigma", [0.5, 1.5])
+def test_lift_that_comes_late_is_no_boom(tmp_path, sigma):
+    """The normal force lags behind alpha as behind vanes 5 m ahead, the side force behind beta does not."""
+    late = Aircraft(parts=(("unsteady_lift", "same", 33.0),))  # per alphadot c/2V
+    flights = [reconstruct(record) for record in flown(tmp_path, sigma, 0.0, aircraft=late)]
+    boom, error = boom_of_vanes(flights)
+    assert boom - 5.0 * error > 2.0
+    assert not noted(met_together(flights))
 
 
 def test_in_still_air_the_motion_is_all_that_moves_the_flow(tmp_path):

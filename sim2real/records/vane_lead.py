@@ -3,14 +3,15 @@
 On a nose boom x ahead of the centre of gravity a gust shows x/V earlier, while what the aircraft's own motion does to
 the flow shows at once (the rest of it is corrected by rates, `estimators.compatibility.flow_angles`). What moves the
 flow angles beside the motion, which gyros and accelerometers tell, is gust; the normal force lags behind that part of
-alpha by the lead. Least squares as in `late_power`. The flow at the centre of gravity is what the vanes read a lead
-ago, and what the motion has changed since.
+alpha by the lead, and the side force behind that of beta. Where the normal force alone lags, the wings are late and the
+vanes are where they should be. Least squares as in `late_power`. The flow at the centre of gravity is what the vanes
+read a lead ago, and what the motion has changed since.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,15 +28,15 @@ from sim2real.records.reconstruct import Reconstruction
 SMOOTH = 0.2  # s, over which a parabola through alpha tells how it changes
 LEAST, LONGEST, EDGE = 2.0, 12.0, 0.25  # m: shorter booms are left alone, longer ones are none; s
 AGAIN = 3  # times that gusts are told from the motion and the motion from them
+VANES = ("alpha", "beta")
 NEEDED = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "ax", "ay", "az")
 
 
 def met_together(flights: Sequence[Reconstruction]) -> list[Reconstruction]:
     """Records with the flow angles that the centre of gravity meets."""
-    boom, error = boom_of_vanes(flights)
-    if not (boom > CLEAR * error and LEAST < boom < LONGEST):
+    (boom, error), place = boom_of_vanes(flights), _declared(flights)
+    if not (boom > CLEAR * error and LEAST < boom < LONGEST) or _late_lift(flights, boom):
         return list(flights)
-    place = _declared(flights)
     if place is not None and abs(boom - place) < 0.5 * place:  # nearer to that than to the centre of gravity
         return [_later(flight, place, ", as declared") for flight in flights]
     return [_later(flight, boom) for flight in flights]
@@ -59,7 +60,13 @@ def boom_of_vanes(flights: Sequence[Reconstruction]) -> tuple[float, float]:
 
     Beside the lag that they are known to have, by which all that they read is late.
     """
-    return until_none_is_left(flights, _spans, LONGEST)
+    return until_none_is_left(flights, _normal, LONGEST)
+
+
+def _late_lift(flights: Sequence[Reconstruction], boom: float) -> bool:
+    """Whether it is the wings that are late, not the vanes early: beta's gusts do not lead the side force as far."""
+    ahead, error = until_none_is_left(flights, _sideways, LONGEST)
+    return bool(np.isfinite(error)) and ahead < 0.5 * boom
 
 
 def _lead(flight: Reconstruction, boom: float) -> float:
@@ -67,19 +74,33 @@ def _lead(flight: Reconstruction, boom: float) -> float:
     return boom / float(np.median(flight.channel("airspeed")))
 
 
-def _spans(flight: Reconstruction, boom: float) -> list[FloatArray]:
+def _normal(flight: Reconstruction, boom: float) -> list[FloatArray]:
     """Alpha, how its gusts lessen a metre on, what lift goes with beside, the normal force [samples, columns]."""
+    return _spans(flight, boom, "alpha", "az", lambda alpha: [
+        alpha**2, flight.channel("q") / flight.channel("airspeed"), flight.controls["elevator"]])  # fmt: skip
+
+
+def _sideways(flight: Reconstruction, boom: float) -> list[FloatArray]:
+    """As `_normal`, of beta and the side force."""
+    return _spans(flight, boom, "beta", "ay", lambda _: [
+        *(flight.channel(rate) / flight.channel("airspeed") for rate in ("p", "r")),
+        flight.controls["rudder"], flight.controls["aileron"]])  # fmt: skip
+
+
+def _spans(flight: Reconstruction, boom: float, vane: str, force: str,
+           beside: Callable[[FloatArray], list[FloatArray]]) -> list[FloatArray]:  # fmt: skip
+    """An angle, how its gusts lessen a metre on, what goes `beside`, the force's coefficient [samples, columns]."""
     length = 2 * round(0.5 * SMOOTH / flight.dt) + 1
     if length < 5 or not all(flight.has(name) for name in NEEDED):
         return []
-    late, (own, _) = lateness(float(flight.parameters["vane_lag"][0]), flight.dt), motion(flight)
-    alpha = flight.channel("alpha") - np.cumsum(own) * flight.dt
-    alpha = np.interp(flight.time - _lead(flight, boom) + late, flight.time, alpha) + np.cumsum(own) * flight.dt
-    gusty = (savgol_filter(alpha, length, 2, deriv=1, delta=flight.dt) - own) * _lead(flight, 1.0)
-    V, az, q = (flight.channel(name) for name in ("airspeed", "az", "q"))
-    p, elevator = flight.parameters[0], flight.controls["elevator"]
+    late, own = lateness(float(flight.parameters["vane_lag"][0]), flight.dt), motion(flight)[VANES.index(vane)]
+    angle = flight.channel(vane) - np.cumsum(own) * flight.dt
+    angle = np.interp(flight.time - _lead(flight, boom) + late, flight.time, angle) + np.cumsum(own) * flight.dt
+    gusty = (savgol_filter(angle, length, 2, deriv=1, delta=flight.dt) - own) * _lead(flight, 1.0)
+    p, V = flight.parameters[0], flight.channel("airspeed")
     qs = 0.5 * density(float(np.median(flight.altitude))) * V**2 * float(p["wing_area"])
-    columns = np.column_stack([alpha, -gusty, alpha**2, q / V, elevator, float(p["mass"]) * az / qs])
+    felt = float(p["mass"]) * flight.channel(force) / qs
+    columns = np.column_stack([angle, -gusty, *beside(angle), felt])
     edge, each = length + round(EDGE / flight.dt), round(SPAN / flight.dt)
     inside = columns[edge:-edge] - columns[edge:-edge].mean(axis=0)
     return [inside[i : i + each] for i in range(0, len(inside) - each + 1, each)]
@@ -109,7 +130,7 @@ def motion(flight: Reconstruction) -> tuple[FloatArray, FloatArray]:
 def _at_centre(flight: Reconstruction, lead: float) -> dict[str, FloatArray]:
     """Flow angles of some time ago and what the motion has changed since."""
     out = {}
-    for name, own in zip(("alpha", "beta"), motion(flight), strict=True):
+    for name, own in zip(VANES, motion(flight), strict=True):
         turned = cumulative_trapezoid(own, dx=flight.dt, initial=0.0)
         turned = _behind(turned, float(flight.parameters["vane_lag"][0]), flight.dt)
         out[name] = _ago(flight.channel(name) - turned, lead / flight.dt) + turned
