@@ -16,7 +16,8 @@ import pytest
 from icing_env.errors import InputError
 from testbed.benchmarks.answers import answered
 from testbed.commands.diagnose import cost
-from testbed.workers import START, a_core_each, peak_memory_gb, processes
+from testbed.memory import peak_memory_gb
+from testbed.workers import START, a_core_each, processes
 
 KILLED = """
 import os, time
@@ -27,19 +28,40 @@ if __name__ == "__main__":
         time.sleep(600)
 """
 
+KEPT = """
+import numpy as np
+from testbed.memory import give_back_memory, keep_freed_memory
+
+def now():
+    with open("/proc/self/status") as status:
+        return next(int(line.split()[1]) for line in status if line.startswith("VmRSS")) * 1024 / 1e9
+
+keep_freed_memory()
+print(now())
+held = np.ones(50_000_000)
+del held
+print(now())
+give_back_memory()
+print(now())
+"""
+
 
 def told(name: str) -> str | None:
     return os.environ.get(name)
 
 
 def test_workers_start_with_it_and_nobody_else(monkeypatch):
-    for name in START:
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv("MALLOC_TRIM_THRESHOLD_", "1000")
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
     with a_core_each(), processes(1) as pool:
-        assert list(pool.map(told, START)) == ["1", START["MALLOC_MMAP_THRESHOLD_"], "1000"]
+        assert list(pool.map(told, START)) == ["1"]
     assert "OMP_NUM_THREADS" not in os.environ
-    assert os.environ["MALLOC_TRIM_THRESHOLD_"] == "1000"
+
+
+def test_what_the_user_set_stands(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    with a_core_each(), processes(1) as pool:
+        assert pool.submit(told, "OMP_NUM_THREADS").result() == "2"
+    assert os.environ["OMP_NUM_THREADS"] == "2"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of another kind")
@@ -90,3 +112,15 @@ def test_memory_is_told_in_gigabytes():
     held = np.ones(50_000_000)
     assert held.nbytes / 1e9 <= peak_memory_gb() < 50.0
     assert cost(27.3).startswith("Took 27 s and ") and cost(27.3).endswith(" GB of memory at most.")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="of GNU's C library")
+@pytest.mark.parametrize(("trim", "kept"), [(None, True), ("131072", False)])
+def test_freed_memory_is_kept_until_it_is_given_back(trim, kept):
+    """By a process of its own: how the C library keeps memory is not to be undone."""
+    own = {"MALLOC_MMAP_THRESHOLD_": str(2**30), "MALLOC_TRIM_THRESHOLD_": trim} if trim else {}
+    user = {name: value for name, value in os.environ.items() if not name.startswith("MALLOC_")}
+    said = subprocess.run([sys.executable, "-c", KEPT], env=user | own, capture_output=True, text=True, check=True)
+    before, freed, given_back = map(float, said.stdout.split())
+    assert (freed - before > 0.3) is kept
+    assert given_back - before < 0.1

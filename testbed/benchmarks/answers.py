@@ -15,6 +15,7 @@ from typing import Any
 
 from icing_env.errors import InputError
 from icing_env.record import FlightRecord
+from testbed.memory import give_back_memory
 from testbed.withheld.files import read_json, write_text
 from testbed.workers import processes
 
@@ -110,4 +111,6 @@ def answered(work: Callable[[], dict[str, Any]], case: Path) -> dict[str, Any]:
         why = str(error)
     except Exception as error:
         why = f"{type(error).__name__}: {error}"
+    finally:
+        give_back_memory()
     return {"error": why.replace(f"{case}/", "")}

@@ -55,7 +55,9 @@ def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tu
 
     from sim2real.diagnosis import diagnose
     from sim2real.rollout import from_file
+    from testbed.memory import keep_freed_memory
 
+    keep_freed_memory()
     if not records:
         raise InputError("no RECORD to diagnose: give at least one, or a manoeuvre with --plan")
     shown, unseen, clean = by_role(records)
@@ -83,7 +85,7 @@ def command(records: tuple[Path, ...], held_out: tuple[Path, ...], reference: tu
 
 def cost(seconds: float) -> str:
     """What a diagnosis took."""
-    from testbed.workers import peak_memory_gb
+    from testbed.memory import peak_memory_gb
 
     memory = peak_memory_gb()
     return f"Took {seconds:.0f} s" + ("." if memory is None else f" and {memory:.1f} GB of memory at most.")
