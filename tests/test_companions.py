@@ -15,6 +15,7 @@ from sim2real.posterior.sets import SetFit
 from testbed.withheld.flights import Aircraft
 
 
+@pytest.mark.slow
 def test_what_a_path_tells_is_tried_though_nothing_is_left_of_the_flight(tmp_path):
     """Ice left nothing that any generic term would take, and engines that spool up slowly beside it were not asked."""
     aircraft = Aircraft(parts=(("spool_lag", "same", 0.75), ("wing_ice", "same", 0.17)))

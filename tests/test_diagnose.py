@@ -49,8 +49,9 @@ def first(found: Diagnosis) -> list[str]:
 
 
 @pytest.mark.parametrize(("effect", "value"), [
-    ("lift_slope:change", -0.25), ("alpha_bias:offset", 0.009), ("aileron_power:change", 0.25),
-    ("elevator_lag:extra", 0.1), ("elevator_rate_limit:reduction", 0.65),
+    ("lift_slope:change", -0.25), ("elevator_lag:extra", 0.1),
+    *(pytest.param(name, value, marks=pytest.mark.slow) for name, value in (
+        ("alpha_bias:offset", 0.009), ("aileron_power:change", 0.25), ("elevator_rate_limit:reduction", 0.65))),
 ])  # fmt: skip
 def test_an_injected_effect_is_found_with_its_size(effect, value):
     name, _, parameter = effect.partition(":")
@@ -87,7 +88,7 @@ def test_an_effect_left_out_of_the_library_is_not_named():
 
 @pytest.mark.parametrize(("effect", "value", "component", "term"), [
     ("rudder_power:change", -0.35, "yawing_moment", "rudder"),
-    ("dihedral_effect:change", 0.6, "rolling_moment", "beta"),
+    pytest.param("dihedral_effect:change", 0.6, "rolling_moment", "beta", marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_a_neighbour_that_helps_the_models_own_numbers_within_their_range_is_not_the_cause(effect, value, component,
                                                                                          term):
@@ -170,6 +171,7 @@ def test_bad_input_is_one_line_and_exit_2(arguments, word, tmp_path, capsys):
     assert word in said
 
 
+@pytest.mark.slow
 def test_misfit_that_nothing_explains_counts_as_noise_and_not_as_proof():
     record = flown("", 0.0, 5).slice(0.0, 30.0)
     rough = np.sin(2.7 * record.time) * np.sign(np.sin(0.9 * record.time))

@@ -20,8 +20,8 @@ def flown(number: str, off: float, seed: int) -> FlightRecord:
     return fly(chosen, seed=seed, observer=False, protection=False).record
 
 
-@pytest.mark.parametrize(("number", "share"), [
-    ("Cn_p", 1.2), pytest.param("Cl_r", 2.4, marks=pytest.mark.slow)])  # fmt: skip
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "share"), [("Cn_p", 1.2), ("Cl_r", 2.4)])
 def test_a_cross_derivative_far_off_is_told_as_that(number: str, share: float):
     """By eight times its spread: beyond five it looked like an inertia, which scales all moments about an axis."""
     off = share * float(load()[number][0])

@@ -96,8 +96,10 @@ def test_the_model_settles_in_gusts_of_the_right_kind(sigma, kind):
 
 
 @pytest.mark.parametrize(("seed", "kind", "gap"), [
-    (10, KINDS[1], {"trim": 0.06}), (15, KINDS[3], {"stability": 0.5}), (12, KINDS[2], {"stability": 0.5}),
-    (4, KINDS[2], {"elevator": 0.6}), (4, LATER, {"trim": 0.06}), (13, LATER, {"roll": 0.006}),
+    (10, KINDS[1], {"trim": 0.06}), (13, LATER, {"roll": 0.006}),
+    *(pytest.param(*case, marks=pytest.mark.slow) for case in (
+        (15, KINDS[3], {"stability": 0.5}), (12, KINDS[2], {"stability": 0.5}), (4, KINDS[2], {"elevator": 0.6}),
+        (4, LATER, {"trim": 0.06}))),
 ])
 def test_of_a_gap_that_no_gusts_make_sense_of_a_first_guess_tells_their_kind(seed, kind, gap):
     """Settled without it, the model is told to meet 3.2 m/s, or derivatives go as far as they may in air that turns."""
@@ -159,7 +161,7 @@ def test_the_gusts_of_all_records_are_of_the_kind_that_most_of_them_say():
     assert likeliest_explained(flights[:1], [choose_gain(flights[0], SIGMAS)], [()])[0].gusts.kind == KINDS[1]
 
 
-@pytest.mark.parametrize("kind", KINDS[1:])
+@pytest.mark.parametrize("kind", [KINDS[1], *(pytest.param(kind, marks=pytest.mark.slow) for kind in KINDS[2:])])
 def test_a_clean_aircraft_in_gusts_of_another_kind_is_not_blamed(kind):
     """Unknown at the rolling moment where the air turns, `downwash_lag` where the tail meets gusts at once."""
     found = diagnose([flown(3, 1.5, kind)])
@@ -176,7 +178,7 @@ def test_air_that_does_not_turn_is_not_taken_to_turn_at_the_start_either():
     assert np.diag(turning.start)[at].all() and turning.K[:, at].any(axis=(0, 2)).all()
 
 
-@pytest.mark.parametrize("kind", [Kind(False, False), Kind(False, True)])
+@pytest.mark.parametrize("kind", [Kind(False, False), pytest.param(Kind(False, True), marks=pytest.mark.slow)])
 def test_references_are_fitted_in_the_gusts_that_they_met(kind):
     """An aircraft without a lag of the downwash: fitted in gusts that the tail meets later, it has one or three."""
     flights = [reconstruct(flown(seed, 0.5, kind, lag=0.0)) for seed in (3, 4)]

@@ -87,6 +87,7 @@ def test_ice_that_grows_is_told_as_it_grew():
     assert "changing in time: 0.0" in sentences(found)[0]
 
 
+@pytest.mark.slow
 def test_a_moment_that_varies_is_unknown_where_many_effects_would_say_it():
     """Of varying size, a trim, a centre of gravity and the power's moment all follow it."""
     found = diagnose([grown("pitch_trim", "delta_Cm_0", lambda time: 0.0012 + 0.0008 * np.sin(0.3 * time))])
@@ -165,6 +166,7 @@ def test_ice_is_the_water_met():
     assert met[-1] == pytest.approx(5e-4 * way, rel=0.01)
 
 
+@pytest.mark.slow
 def test_one_short_record_has_no_stretches_to_differ():
     record = flown(3).slice(0.0, 9.0)
     found = diagnose([with_alpha(record, 0.02 * np.sin(record.time))])

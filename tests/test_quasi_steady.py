@@ -41,6 +41,7 @@ def test_an_aircraft_without_the_lag_has_no_gap_and_the_records_say_so(sigma):
     assert found.verdict == "no_gap" and noted(found)
 
 
+@pytest.mark.slow
 def test_what_else_it_has_is_told_alone_and_the_command_flies_both():
     found = diagnose([flown(0.5, 0.0, 0.02)])
     assert found.hypotheses[0]["effects"] == ["pitch_trim"] and noted(found)

@@ -110,7 +110,7 @@ def test_a_rounded_surface_follows_its_command_all_the_same():
         assert sharp.surface_noise[j] < rounded.surface_noise[j] < SURFACE_NOISE
 
 
-@pytest.mark.parametrize("sigma", [0.0, 0.5])
+@pytest.mark.parametrize("sigma", [pytest.param(0.0, marks=pytest.mark.slow), 0.5])
 def test_a_clean_aircraft_on_coarse_levels_is_not_blamed(sigma: float):
     found = diagnose([on_levels(flown(seed, sigma), LEVELS) for seed in (3, 4, 5)])
     assert found.verdict == "no_gap"
@@ -140,6 +140,7 @@ def test_levels_are_not_taken_for_samples_that_are_held():
     assert not [p for p in told if "repeats" in p.kind]
 
 
+@pytest.mark.slow
 def test_a_clean_aircraft_with_slow_vanes_is_not_blamed():
     found = diagnose([holding(flown(seed), ("alpha", "beta", "airspeed"), 5) for seed in (3, 4, 5)])
     assert found.verdict == "no_gap"

@@ -28,10 +28,10 @@ from sim2real.library.candidates import (
 from testbed.flight import fly
 from testbed.withheld.flights import Aircraft
 
-LONGEST = ("engine_arm_z", "Cm_elevator_CT")
 BIASES = {"bias_alpha": 2e-3, "bias_beta": -1.5e-3, "bias_q": 5e-4, "bias_az": 0.03, "bias_theta": 1.5e-3}
 
 
+@pytest.mark.slow
 def test_offsets_that_all_flights_have_are_no_gap_and_one_beside_them_is(tmp_path):
     own = Aircraft(terms=BIASES)
     clean, again = (in_still_air(tmp_path, role, own, seed) for role, seed in (("reference", 1), ("diagnose", 2)))
@@ -43,14 +43,14 @@ def test_offsets_that_all_flights_have_are_no_gap_and_one_beside_them_is(tmp_pat
     assert size["low95"] - 5e-4 < 8e-3 < size["high95"] + 5e-4
 
 
-@pytest.mark.parametrize(("times", "gap"), [(1.0, False), (4.0, True)])
+@pytest.mark.parametrize(("times", "gap"), [(1.0, False), pytest.param(4.0, True, marks=pytest.mark.slow)])
 def test_without_references_offsets_beyond_a_calibration_are_a_gap(tmp_path, times, gap):
     own = Aircraft(terms={name: times * offset for name, offset in BIASES.items()})
     assert (diagnose(in_still_air(tmp_path, "diagnose", own, 2)).verdict != "no_gap") == gap
 
 
 @pytest.mark.parametrize("number", [
-    pytest.param(n, marks=pytest.mark.slow) if n in LONGEST else n for n in TOLD_ONCE])  # fmt: skip
+    n if n == "spool_time" else pytest.param(n, marks=pytest.mark.slow) for n in TOLD_ONCE])  # fmt: skip
 def test_a_number_that_one_source_tells_may_be_another_without_a_gap(tmp_path, number):
     far = 8.0 if number == "spool_time" else -8.0  # no engine spools before it is told to
     within, beyond = (Aircraft(baseline={number: 1.0 + times * TOLD_ONCE[number]}) for times in (-1.2, far))
@@ -74,8 +74,9 @@ def test_what_calibration_and_rigging_leave_is_no_gap():
     assert found.verdict == "no_gap", found.hypotheses[:3]
 
 
-@pytest.mark.parametrize(("name", "where"), [("bias_q", "sensor:q"), ("Cl_0", "rolling_moment"),
-                                             ("aileron_offset", "aileron_path")])  # fmt: skip
+@pytest.mark.parametrize(("name", "where"), [
+    ("bias_q", "sensor:q"), ("aileron_offset", "aileron_path"),
+    pytest.param("Cl_0", "rolling_moment", marks=pytest.mark.slow)])  # fmt: skip
 def test_ten_times_as_much_is_one(name, where):
     found = diagnose([flown({name: 10.0 * (INSTRUMENTS | RIGGING)[name]})])
     assert found.verdict != "no_gap" and found.where["components"][where] > 0.5, found.hypotheses[:3]

@@ -42,20 +42,17 @@ def _as_there(name: str, text: str) -> str:
     return "".join(",".join(row[i] for i in kept) + "\n" for row in rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sigma", "gusts", "seed"), [
-    pytest.param(0.0, "later", 0, marks=pytest.mark.slow), (0.5, "at_once", 3),
-    pytest.param(1.5, "later", 2, marks=pytest.mark.slow), pytest.param(1.5, "at_once", 4, marks=pytest.mark.slow),
-    pytest.param(0.5, "rolling", 5, marks=pytest.mark.slow), pytest.param(0.5, "turning", 6, marks=pytest.mark.slow),
-])  # fmt: skip
+    (0.0, "later", 0), (0.5, "at_once", 3), (1.5, "later", 2), (1.5, "at_once", 4), (0.5, "rolling", 5),
+    (0.5, "turning", 6)])  # fmt: skip
 def test_its_clean_aircraft_has_no_gap(tmp_path, sigma, gusts, seed):
     found = solve(case(tmp_path / "case", sigma, gusts, seed))
     assert found["verdict"] == "no_gap", found["hypotheses"][:3]
 
 
-@pytest.mark.parametrize(("effect", "size"), [
-    pytest.param("elevator_power", -0.25, marks=pytest.mark.slow),
-    pytest.param("aileron_gearing", -0.2, marks=pytest.mark.slow),
-])  # fmt: skip
+@pytest.mark.slow
+@pytest.mark.parametrize(("effect", "size"), [("elevator_power", -0.25), ("aileron_gearing", -0.2)])
 def test_an_effect_of_it_is_told_alone(tmp_path, effect, size):
     found = solve(case(tmp_path / "case", 0.5, "at_once", 7, ((effect, "same", size),)))
     assert found["hypotheses"][0]["effects"] == [effect], found["hypotheses"][:3]

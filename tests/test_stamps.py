@@ -65,6 +65,7 @@ def test_samples_that_jitter_and_records_with_gaps_keep_their_stamps():
         assert evenly_spaced(kept) is kept
 
 
+@pytest.mark.slow
 def test_a_clean_aircraft_with_a_bad_clock_is_not_blamed():
     found = diagnose([stamped(flown(seed), jitter(flown(seed), seed)) for seed in (1, 2, 3)])
     assert found.verdict == "no_gap"

@@ -64,6 +64,7 @@ def test_what_a_side_file_declares_stays():
     assert not any("in the references" in note for note in reconstruct(now[1]).notes)
 
 
+@pytest.mark.slow
 def test_a_loss_of_measured_thrust_is_named_beside_references_though_no_side_file_tells():
     """A propeller that pulls 15 % less of the same torque than its own chart, which pulls a fifth more than ours."""
     lost = scenario.load("clear_air", duration=52.0, effects={"thrust_loss": {"change": -0.15}},

@@ -123,6 +123,7 @@ def test_limits_lie_within_what_the_iced_aircraft_can_do(severity, eta):
     assert a["load_factor_limit"][0] == pytest.approx((m["airspeed"][0]/stall_speed)**2, rel=0.25)
 
 
+@pytest.mark.slow
 def test_doubt_and_gusts_narrow_the_limits_of_an_iced_aircraft_only():
     sure, unsure = iced(severity=0.4), iced(severity=0.4)
     e = believed(2, severity=0.4)

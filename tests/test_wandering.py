@@ -89,6 +89,7 @@ def test_a_hidden_interconnection_is_unknown_and_said_to_go_with_the_other_surfa
     assert told["aileron"] == pytest.approx(0.15, abs=0.03)
 
 
+@pytest.mark.slow
 def test_a_gearing_of_one_side_is_told_by_the_magnitude():
     """A rudder that answers a fifth less to the right alone: half of that is a gearing, in another form or unknown."""
     records = []
@@ -107,6 +108,7 @@ def test_a_gearing_of_one_side_is_told_by_the_magnitude():
     assert told["magnitude"] == pytest.approx(-0.1, abs=0.03)
 
 
+@pytest.mark.slow
 def test_a_surface_that_moves_as_no_term_has_it_is_unknown_and_said_to_go_with_time():
     """A pick-up's course of its own, in what was recorded and nowhere in flight: its command knows nothing of it."""
     records = []

@@ -43,6 +43,7 @@ def test_everything_that_is_needed_is_inside(wheel):
     assert not [name for name in names if name.startswith(("tests/", "docs/", "configs/"))]
 
 
+@pytest.mark.slow
 def test_it_works_without_the_checkout(wheel, tmp_path):
     python, clean = tmp_path / "venv/bin/python", {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     clean["NUMBA_OPT"] = "0"  # quicker to compile

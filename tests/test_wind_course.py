@@ -38,6 +38,7 @@ def through_a_front(change: float, seed: int = 3) -> FlightRecord:
     return flown_again(flown(seed), rows, 0.1)
 
 
+@pytest.mark.slow
 def test_a_front_is_unknown_at_the_wind():
     change = 2.0
     found = diagnose([through_a_front(change, seed) for seed in (3, 4)])
