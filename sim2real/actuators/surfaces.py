@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,7 @@ AT_LIMIT = 0.98  # share of a rate limit that is at it
 RATES, ANOTHER, TURNS = (-1.2, 1.2), (0.9, 1.1), 3  # logarithms of times the published limit; times it that are another
 SCALES = (5, 25, 100)  # samples over which what is left has to average out as white noise does
 SHORTEST, FINE = 1e-3, 1e-4  # s: least lag, and how finely it is found
+Parts = tuple[FloatArray, FloatArray]  # of a law: the aircraft's, and a record's own [N, terms]
 CHANCE, SURE = 1e-5, 1.05  # of white noise not to pass for it; what the noise itself may be off by (squared)
 
 
@@ -94,7 +95,7 @@ class _Path:
         """Times which what is left by a law is as large."""
         return max(1.0, self.least / POSITION_NOISE)
 
-    def behind(self, lag: float, filtered: bool = True) -> tuple[FloatArray, FloatArray]:
+    def behind(self, lag: float, filtered: bool = True) -> Parts:
         """What the actuator at some lag makes of a position [N, terms]: what is the aircraft's, and the record's."""
         basis = _basis(_behind(self.flight, self.command, self.surface, lag, filtered, self.quick))
         return basis[:, SHARED], basis[:, OWN]
@@ -187,10 +188,24 @@ class _Fit:
         """Of numbers fitted, the lag apart."""
         return self.terms[0] + self.terms[1] * len(self.paths)
 
-    def weights(self, lag: float) -> tuple[FloatArray, list[FloatArray]]:
+    def positions(self, lag: float) -> list[FloatArray]:
+        """Of every record [N], before the recording's low pass."""
+        return self._of([path.behind(lag, filtered=False) for path in self.paths], *self._weights(self._seen(lag)))
+
+    def left(self, lag: float) -> list[FloatArray]:
+        """What the recorded positions have beside."""
+        seen = self._seen(lag)
+        return [path.recorded - there[path.good]
+                for path, there in zip(self.paths, self._of(seen, *self._weights(seen)), strict=True)]
+
+    def _seen(self, lag: float) -> list[Parts]:
+        """What the law is made of behind the recording's low pass."""
+        return [path.behind(lag) for path in self.paths]
+
+    def _weights(self, seen: list[Parts]) -> tuple[FloatArray, list[FloatArray]]:
         """Those of the aircraft, and of every record; the position itself where none is fitted."""
         shared, own = self.terms
-        parts = [tuple(part[path.good] for part in path.behind(lag)) for path in self.paths]
+        parts = [tuple(part[path.good] for part in both) for both, path in zip(seen, self.paths, strict=True)]
         first = np.eye(parts[0][0].shape[1])[0]
         if shared:
             inside = [_without(own_of[:, :own], np.column_stack([of_all[:, :shared], path.recorded]))
@@ -201,17 +216,11 @@ class _Fit:
         return first, [np.linalg.lstsq(own_of[:, :own], path.recorded - of_all @ first, rcond=None)[0]
                        for (of_all, own_of), path in zip(parts, self.paths, strict=True)]
 
-    def positions(self, lag: float, filtered: bool = False) -> list[FloatArray]:
-        """Of every record [N], before the recording's low pass or behind it."""
-        first, beside = self.weights(lag)
-        parts = [path.behind(lag, filtered) for path in self.paths]
+    @staticmethod
+    def _of(parts: list[Parts], first: FloatArray, beside: list[FloatArray]) -> list[FloatArray]:
+        """What weights make of parts [N]."""
         return [np.asarray(of_all @ first + own_of[:, : len(more)] @ more)
                 for (of_all, own_of), more in zip(parts, beside, strict=True)]
-
-    def left(self, lag: float) -> list[FloatArray]:
-        """What the recorded positions have beside."""
-        return [path.recorded - there[path.good]
-                for path, there in zip(self.paths, self.positions(lag, filtered=True), strict=True)]
 
     def square(self, lag: float) -> float:
         """Sum of the squares of that."""
@@ -260,10 +269,14 @@ def _lag(square: Callable[[float], float], published: float) -> float:
 
 def _basis(position: FloatArray) -> FloatArray:
     """What a smooth law may make of a position [N, terms]: gear, bend, advance, shift and drift."""
-    n = len(position)
-    slow = np.cos(np.pi * np.arange(DRIFTS + 1) * (np.arange(n)[:, None] + 0.5) / n)
     rate = np.gradient(position)
-    return np.column_stack([position, position**3, rate, np.gradient(rate), slow])
+    return np.column_stack([position, position**3, rate, np.gradient(rate), _slow(len(position))])
+
+
+@lru_cache(maxsize=16)
+def _slow(n: int) -> FloatArray:
+    """Shift and drift over n samples [n, 1 + DRIFTS]."""
+    return np.asarray(np.cos(np.pi * np.arange(DRIFTS + 1) * (np.arange(n)[:, None] + 0.5) / n))
 
 
 def _nothing_else(left: NDArray, least: float) -> bool:
