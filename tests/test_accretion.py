@@ -223,7 +223,7 @@ def test_shedding_can_leave_the_wings_uneven() -> None:
     assert s["eta_left_wing"][0] != s["eta_right_wing"][0]
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     lwc=st.floats(0.0, 3e-3),
     mvd=st.floats(0.0, 300e-6),

@@ -103,7 +103,7 @@ def test_it_leaves_slowly_beyond_the_linear_range():
     assert np.abs(np.diff(log)).max() < 1e-3 and log[-1] == -0.02 and a["adaptation"][0] == 0
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_bounded_whatever_is_measured_and_estimated(seed):
     n, rng = 8, np.random.default_rng(seed)

@@ -150,7 +150,7 @@ def test_near_the_speed_limit_the_descent_is_the_one_that_full_power_sustains():
     assert a["climb_command"] == pytest.approx([-0.05*m["airspeed"][0], 0.0], abs=0.15)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1))
 def test_finite_in_finite_and_within_limits_out(seed):
     n = 16

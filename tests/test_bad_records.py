@@ -76,7 +76,7 @@ def test_side_file_faults_are_named(tmp_path: Path, text: str, message: str) -> 
         read(tmp_path / "r.csv")
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.binary(max_size=200))
 def test_any_bytes_are_read_or_refused_in_one_line(tmp_path_factory: pytest.TempPathFactory, raw: bytes) -> None:
     folder = tmp_path_factory.mktemp("bytes")
@@ -97,7 +97,7 @@ def test_clean_records_have_no_problems() -> None:
         assert check(read(flight_data(name))).problems == ()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.sampled_from(["alpha", "q", "theta", "az"]), st.integers(5, 590), st.sampled_from([-1.0, 1.0]))
 def test_a_spike_is_found_and_mended(name: str, row: int, sign: float) -> None:
     record = longitudinal(1)
@@ -110,7 +110,7 @@ def test_a_spike_is_found_and_mended(name: str, row: int, sign: float) -> None:
     assert identify(mended)["Cm_alpha"].estimate == pytest.approx(PITCH["Cm_alpha"], rel=0.03)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.sampled_from(["alpha", "q", "az"]), st.integers(20, 400), st.integers(15, 60))
 def test_a_gap_is_left_out_and_said(name: str, first: int, length: int) -> None:
     record = longitudinal(2)
@@ -193,7 +193,7 @@ def spoil(record: FlightRecord, fault: str, name: str, rng: np.random.Generator)
     return with_channel(record, name, values)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.sampled_from(FAULTS), st.sampled_from(["alpha", "q", "theta", "az"]), st.integers(0, 10_000))
 def test_every_fault_is_named_or_refused_and_never_passes_unseen(fault: str, name: str, seed: int) -> None:
     record = spoil(sound(seed % 3), fault, name, np.random.default_rng(seed))

@@ -76,7 +76,7 @@ def test_extent_factor_is_straight_in_the_logarithm() -> None:
     assert cloud.extent_factor(cloud.CONTINUOUS_MAXIMUM, middle) == pytest.approx(0.6)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     mode=st.sampled_from(MODES),
     altitude=st.floats(0.0, 9000.0),

@@ -64,14 +64,14 @@ ANGLE = st.floats(-20.0, 20.0)
 ANY = st.floats(allow_nan=True, allow_infinity=True)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(phi=ANGLE, theta=st.floats(-math.pi / 2, math.pi / 2), psi=ANGLE, alpha=ANGLE, beta=ANGLE)
 def test_every_attitude_draws(phi: float, theta: float, psi: float, alpha: float, beta: float) -> None:
     view = dataclasses.replace(FLYING, phi=phi, theta=theta, psi=psi, alpha=alpha, beta=beta)
     assert draw(view, SMALL).any()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_any_float_in_any_reading_draws(data: st.DataObject) -> None:
     names = data.draw(st.lists(st.sampled_from(sorted(CHANGES)), min_size=1, max_size=6, unique=True))

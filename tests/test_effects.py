@@ -141,7 +141,7 @@ def test_the_plant_knows_nothing_of_effects() -> None:
     assert np.isfinite(flown(combined).state["u"]).all()
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.dictionaries(st.sampled_from(sorted(LIBRARY)), st.floats(0.0, 1.0), max_size=8))
 def test_any_company_of_effects_gives_finite_numbers(shares: dict[str, float]) -> None:
     values = {

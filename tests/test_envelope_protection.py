@@ -54,7 +54,7 @@ def test_far_inside_every_bit_passes(name):
 
 
 @EVERY
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), severity=st.floats(0, 1))
 def test_finite_within_travel_and_no_more_flap_or_less_power(name, seed, severity):
     n = 16
@@ -66,7 +66,7 @@ def test_finite_within_travel_and_no_more_flap_or_less_power(name, seed, severit
     assert (np.abs(out["aileron"]) <= 0.3).all() and (out["elevator"] >= -0.454 - 1e-9).all()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.integers(0, 2**32 - 1), st.floats(0, 1))
 def test_never_nose_up_never_less_power_and_finite(seed, severity):
     n = 32

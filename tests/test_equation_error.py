@@ -194,7 +194,7 @@ def test_faded_errors_hold_for_a_bias_too_and_are_never_below_the_white_ones() -
     assert np.median(every) < 0.7 * np.std(theta)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(2, 12), st.floats(-3, 3), st.floats(-3, 3))
 def test_slope_filter_is_exact_on_parabolas_and_matched_smoother_has_unit_area(half: int, a: float, b: float) -> None:
     t = np.arange(60) * 0.02

@@ -74,7 +74,7 @@ def harm(before: dict[str, Estimate], after: dict[str, Estimate]) -> list[str]:
             and abs(after[n].estimate - e.estimate) > max(3.0*e.std_error, 0.15*abs(e.estimate))]  # fmt: skip
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(st.data(), st.sampled_from(("calm", "gusts", *RECORDED)), st.sampled_from(FAULTS), st.floats(0.2, 0.6))
 def test_no_fault_in_any_channel_does_harm_in_silence(data: st.DataObject, name: str, fault: str, place: float) -> None:
     record, before = sound(name)

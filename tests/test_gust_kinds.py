@@ -178,7 +178,8 @@ def test_air_that_does_not_turn_is_not_taken_to_turn_at_the_start_either():
     assert np.diag(turning.start)[at].all() and turning.K[:, at].any(axis=(0, 2)).all()
 
 
-@pytest.mark.parametrize("kind", [Kind(False, False), pytest.param(Kind(False, True), marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [Kind(False, False), Kind(False, True)])
 def test_references_are_fitted_in_the_gusts_that_they_met(kind):
     """An aircraft without a lag of the downwash: fitted in gusts that the tail meets later, it has one or three."""
     flights = [reconstruct(flown(seed, 0.5, kind, lag=0.0)) for seed in (3, 4)]

@@ -70,6 +70,7 @@ def test_another_size_in_each_record_is_told_by_record():
     assert all(s["low95"] - 1e-3 < (0.006, 0.018)[s["record"]] < s["high95"] + 1e-3 for s in entry["sizes"])
 
 
+@pytest.mark.slow
 def test_ice_that_grows_is_told_as_it_grew():
     """No one size of it explains the record, and something unknown that drifts would follow it."""
     def eta(time: float) -> float:

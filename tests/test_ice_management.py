@@ -129,7 +129,7 @@ def test_flap_waits_until_tail_ice_is_gone():
     assert managed(believed(), 120, a)[0]["flap_limit"] > 0.6
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1))
 def test_finite_and_bounded_whatever_instruments_and_estimate_say(seed):
     n, rng = 16, np.random.default_rng(seed)

@@ -90,6 +90,7 @@ def test_what_terms_explain_of_clean_flights_is_no_evidence():
     assert clean.misfit == found.misfit
 
 
+@pytest.mark.slow
 def test_an_aircraft_that_the_model_knows_is_disturbed_little_and_has_no_gap(tmp_path):
     """References of an aircraft whose derivatives are off by their published spread, of the other plant."""
     aircraft = Aircraft(published_spread(np.random.default_rng(5)))

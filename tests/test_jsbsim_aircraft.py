@@ -178,6 +178,7 @@ def corrected(clean: list[Reconstruction]) -> Baseline:
     return fit_baseline(clean, bank())
 
 
+@pytest.mark.slow
 @needs_jsbsim
 def test_gusts_that_references_met_are_told_beside_what_the_model_lacks(tmp_path) -> None:
     """More process noise than the model needs would take them: 0.5 m/s was told as 0.08 to 0.36."""

@@ -96,6 +96,7 @@ def test_what_is_late_where_something_known_enters_is_its_affair():
     assert late_fits(found, 0.0, 1.0, {"elevator_path"}) == []
 
 
+@pytest.mark.slow
 def test_an_elevator_that_answers_late_is_told_as_that_and_not_as_a_lag(capsys):
     found = diagnose([asked_early(seed, "elevator", 7) for seed in (4, 5, 6)])
     assert found.verdict == "unknown"

@@ -38,7 +38,7 @@ def test_engages_without_a_jump(name):
 
 
 @EVERY
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_finite_in_finite_and_within_travel_out(name, seed):
     module, n = law(name), 8

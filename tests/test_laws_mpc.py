@@ -52,7 +52,7 @@ def least(h, f, rows, most):
     return None if np.linalg.norm(left) < 1e-9 else back @ (-left[:-1]/left[-1] - back.T @ f)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(seed=st.integers(0, 2**32 - 1), above=st.floats(-0.05, 0.2))
 def test_the_solution_is_that_of_another_minimiser(seed, above):
     q = np.random.default_rng(seed).normal(size=6)*np.array([0.5, 0.1, 0.0, 0.2, 0.1, 0.05])

@@ -35,7 +35,7 @@ def test_kept_functions_expand_to_the_terms_that_made_the_target() -> None:
         assert abs(value[name]) * np.std(functions[name]) < 0.003 * np.std(target), name
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 1000), st.permutations(["a", "e", "a*a", "a*e", "a*a*a", "e*e"]))
 def test_all_functions_together_are_least_squares_in_any_order(seed: int, order: list[str]) -> None:
     functions, target = cubic(seed, 200)

@@ -142,6 +142,7 @@ def test_a_derivative_shows_only_beyond_its_own_spread(elevator, lateral):
         assert abs(1.0 / (1.0 + limit) - 1.0) / SPREAD >= DETECTABLE
 
 
+@pytest.mark.slow
 def test_a_gap_twice_the_limit_is_found_and_one_of_a_quarter_is_not(elevator):
     limit = elevator.detection_limits["pitch_trim"]["smallest"]
     assert diagnose([flown({"pitch_trim": {"delta_Cm_0": 2.0 * limit}})]).verdict != "no_gap"

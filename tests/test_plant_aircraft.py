@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from plant import coefficients, flown_from_trim, level, loads, rates
 
@@ -238,7 +238,6 @@ def test_standard_atmosphere(altitude: float, kelvin: float, pascal: float, rho:
 
 
 @given(st.floats(-300.0, 20000.0))
-@settings(deadline=None)
 def test_pressure_altitude_inverts_pressure(altitude: float) -> None:
     assert atmosphere.pressure_altitude(atmosphere.pressure(altitude)) == pytest.approx(altitude, abs=1e-6)
 

@@ -52,7 +52,7 @@ def anywhere(n: int, seed: int, parameters: NDArray = AIRCRAFT) -> tuple[NDArray
 # ---- what must be conserved
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.tuples(*[st.floats(-1.0, 1.0)] * 3), st.floats(20.0, 100.0), st.floats(-300.0, 300.0))
 def test_without_air_energy_and_angular_momentum_are_conserved(w: tuple, speed: float, xz: float) -> None:
     p = changed(AIRCRAFT, density_factor=0.0, power_rated=0.0, inertia_xz=1528.0 + xz)

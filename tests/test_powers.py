@@ -72,6 +72,7 @@ def test_thrust_that_its_owner_computed_drives_the_model_whatever_the_published_
     assert diagnose([record]).verdict == "no_gap"
 
 
+@pytest.mark.slow
 def test_thrust_that_was_measured_is_compared_with_what_the_torque_makes():
     flight = reconstruct(by_another_chart("measured"))
     assert flight.power_from == "torque" and flight.has("thrust_left")
@@ -158,7 +159,7 @@ def test_power_is_the_torques_where_thrust_says_nothing_of_the_propellers_speed(
         assert not any("propellers" in note for note in flight.notes)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(inertia=st.floats(2.0, 80.0), k=st.floats(0.7, 1.3), constant=st.floats(-300.0, 300.0))
 def test_a_propellers_inertia_is_that_of_the_thrust_it_costs(inertia, k, constant):
     t = np.arange(0.0, 40.0, 0.02)

@@ -35,7 +35,7 @@ def noted(found) -> bool:
     return NOTE in found.provenance["records"][0]["notes"]
 
 
-@pytest.mark.parametrize("sigma", [0.0, 0.5])
+@pytest.mark.parametrize("sigma", [pytest.param(0.0, marks=pytest.mark.slow), 0.5])
 def test_an_aircraft_without_the_lag_has_no_gap_and_the_records_say_so(sigma):
     found = diagnose([flown(sigma, 0.0)])
     assert found.verdict == "no_gap" and noted(found)

@@ -30,7 +30,7 @@ def equal(a: FlightRecord, b: FlightRecord) -> bool:
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(data=st.data())
 def test_what_is_written_is_read_back(
     tmp_path_factory: pytest.TempPathFactory, suffix: str, data: st.DataObject

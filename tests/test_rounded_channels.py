@@ -45,7 +45,7 @@ def wandering(seed: int, slow: float, noise: float, count: int = 20_000) -> np.n
     return np.cumsum(slow * rng.standard_normal(count)) + noise * rng.standard_normal(count)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 10_000), st.floats(0.01, 0.3), st.floats(0.0, 1.5))
 def test_means_of_a_rounded_channel_err_by_no_more_than_it_is_said_to(seed: int, slow: float, noise: float):
     samples = wandering(seed, slow, noise)
@@ -66,7 +66,7 @@ def test_what_is_not_rounded_leaves_nothing_open():
 
 
 @given(st.integers(0, 100), st.floats(0.1, 1000.0))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_rounding_has_the_unit_of_its_channel(seed: int, unit: float):
     samples = np.round(wandering(seed, 0.05, 0.2, 3000))
     assert rounding(unit * samples) == pytest.approx(unit * rounding(samples), rel=1e-6)

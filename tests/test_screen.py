@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from icing_env import effects, scenario
@@ -86,7 +86,6 @@ derivative = st.sampled_from(["lift_slope", "static_stability", "pitch_damping",
                               "directional_stability", "aileron_power", "elevator_power", "tail_ice", "wing_ice"])
 
 
-@settings(deadline=None)
 @given(derivative, st.floats(-1.0, 1.0), st.integers(0, 10**6))
 def test_along_a_valley_the_aircraft_stays_what_it_is(flying, name, share, seed):
     parameter = effects.get(name).parameters[0]

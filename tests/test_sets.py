@@ -85,7 +85,7 @@ def test_noise_alone_is_seldom_blamed_on_anything():
     assert blamed < 3
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(seed=st.integers(0, 10_000), a=st.floats(-0.9, 0.9), b=st.floats(-0.9, 0.9))
 def test_powers_give_the_likelihood_that_the_signatures_give(seed, a, b):
     candidates, gram = flown({}, seed)

@@ -29,7 +29,7 @@ def doublet_response(n: int = 1001) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return t, value, rate
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.floats(-5, 5), st.floats(-5, 5), st.integers(16, 300))
 def test_a_straight_line_passes_unchanged(a: float, b: float, n: int) -> None:
     t = np.arange(n) * DT

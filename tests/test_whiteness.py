@@ -45,9 +45,10 @@ def flown(folder, sigma: float, seed: int, gusts: str = "later") -> Reconstructi
     return _reconstructed([record], Baseline(load(), np.eye(1)), None)[0]
 
 
-@pytest.mark.parametrize(("sigma", "gusts"), [(SIGMAS[0], "later"), (0.5, "later"), (1.5, "later"), (0.5, "turning"),
-                                              (1.5, "at_once"), (0.5, "rolling"), (1.5, "turning"),
-                                              (1.5, "rolling")])  # fmt: skip
+@pytest.mark.parametrize(("sigma", "gusts"), [(SIGMAS[0], "later"), (0.5, "later"), (1.5, "later"), (1.5, "turning"),
+                                              *(pytest.param(*air, marks=pytest.mark.slow) for air in (
+                                                  (1.5, "at_once"), (0.5, "rolling"), (0.5, "turning"),
+                                                  (1.5, "rolling")))])  # fmt: skip
 def test_innovations_of_a_known_aircraft_are_white(tmp_path, sigma, gusts):
     white, kind = [], KINDS[conditions.KINDS.index(gusts)]
     for seed in range(SEEDS):
@@ -71,7 +72,8 @@ def kept(flight: Reconstruction, samples: dict[str, slice]) -> Reconstruction:
     return replace(flight, measured=measured)
 
 
-@pytest.mark.parametrize("lost", ["beta", "alpha", "r", "airspeed"])
+@pytest.mark.parametrize("lost", [
+    "beta", "airspeed", *(pytest.param(name, marks=pytest.mark.slow) for name in ("alpha", "r"))])  # fmt: skip
 def test_where_a_channel_is_absent_the_others_innovations_stay_white(tmp_path, lost):
     """Without beta nothing held the gusts from the side: means of p had 17 times their variance, and ay was blamed."""
     squares = []
@@ -106,7 +108,9 @@ def test_channels_that_are_slow_or_stop_are_worth_their_samples(tmp_path, sample
     assert all(0.6 < s < 1.7 for s in squares.values()), squares
 
 
-@pytest.mark.parametrize("slow", [("alpha",), ("beta",), ("airspeed", "alpha", "beta"), ("p", "q", "r", "alpha")])
+@pytest.mark.parametrize("slow", [
+    ("airspeed", "alpha", "beta"),
+    *(pytest.param(names, marks=pytest.mark.slow) for names in (("alpha",), ("beta",), ("p", "q", "r", "alpha")))])  # fmt: skip
 def test_innovations_beside_slow_channels_are_white_and_of_their_size(tmp_path, slow):
     """With the noise that their samples show; a vane that is believed to have next to none colours the airspeed."""
     squares, means = [], []

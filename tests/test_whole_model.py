@@ -45,6 +45,7 @@ def found(records):
     return diagnose(records[:1], records[1:])
 
 
+@pytest.mark.slow
 def test_many_numbers_at_once_are_told_with_their_sizes(found):
     assert found.verdict == "unknown" and found.unknown["places"]
     told = {e["name"]: next(iter(e["parameters"].values())) for e in found.effects if e["probability"] >= 0.5}
@@ -56,12 +57,14 @@ def test_many_numbers_at_once_are_told_with_their_sizes(found):
     assert terms["CZ_0"] == pytest.approx(OTHERS["CZ_0"], abs=0.03)
 
 
+@pytest.mark.slow
 def test_places_are_those_whose_forces_and_moments_differ(found):
     seen = {place for place, p in found.where["components"].items() if p >= 0.5}
     assert {"y_force", "rolling_moment", "pitching_moment", "z_force"} <= seen
     assert found.unknown["places"]["yawing_moment"] < 1.0
 
 
+@pytest.mark.slow
 def test_terms_are_flown_as_large_as_they_are_told(found):
     """By no factor of an effect that changes the same derivative, whichever was fitted first."""
     values = found.details.change.values
@@ -72,6 +75,7 @@ def test_terms_are_flown_as_large_as_they_are_told(found):
         assert told[term] != 0.0 and row[number] == pytest.approx(told[term]), term
 
 
+@pytest.mark.slow
 def test_the_gap_closes_on_a_record_that_was_not_used(found):
     assert found.gap["held_out"]["before"] > 0.5
     assert found.gap["held_out"]["closure"] > 0.8
