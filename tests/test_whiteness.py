@@ -110,7 +110,8 @@ def test_channels_that_are_slow_or_stop_are_worth_their_samples(tmp_path, sample
 
 @pytest.mark.parametrize("slow", [
     ("airspeed", "alpha", "beta"),
-    *(pytest.param(names, marks=pytest.mark.slow) for names in (("alpha",), ("beta",), ("p", "q", "r", "alpha")))])  # fmt: skip
+    *(pytest.param(names, marks=pytest.mark.slow) for names in (("alpha",), ("beta",), ("p", "q", "r", "alpha"))),
+])  # fmt: skip
 def test_innovations_beside_slow_channels_are_white_and_of_their_size(tmp_path, slow):
     """With the noise that their samples show; a vane that is believed to have next to none colours the airspeed."""
     squares, means = [], []
