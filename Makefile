@@ -24,7 +24,7 @@ test: $(FULL) lint  ## install everything, check style, types and imports, run t
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m "not slow"
 
 test-slow: $(FULL)  ## the slow tests alone
-	$(BIN)/python -m pytest -q -m slow
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m slow
 
 lint: $(FULL)  ## style, types, import contracts
 	$(BIN)/ruff check .
