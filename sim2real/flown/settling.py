@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import chi2
 
 from icing_env import effects
 from icing_env.record import FloatArray
@@ -43,6 +44,7 @@ NEAR = 2  # of SIGMAS to either side are tried
 TURNS = 4
 UNLIKE = 0.06  # log of the ratio of innovation variances beyond which another gain is worth a flight (assumed)
 DEPARTED = 1e6  # mean whitened square of a model that does not follow the record: an effect far off makes 1e4
+ODD = 0.05  # of aircraft, whose numbers are farther off together (assumed)
 MOVED = 4.0  # standard deviations by which the model that variants are flown about is moved at most
 
 
@@ -116,16 +118,17 @@ def followed_in_any(flights: Sequence[Reconstruction], candidates: Bank, baselin
 
     Settled in gusts of another kind, often several times as strong as they were, derivatives go as far as they may, and
     terms of a wrong explanation would tell which kind turns the air; settled in each, the model says it by itself. A
-    gap may look like that, too. In both is settled what a first guess has to decide: where numbers of rolling or yawing
-    moments go as far as they may in air that turns, and where any number does, or only the strongest gusts make sense,
-    in which the tail meets them later or not. The latter is not asked of an aircraft that the model follows poorly.
+    gap may look like that, too. In both is settled what a first guess has to decide: where numbers of rolling and
+    yawing moments are together odder in air that turns than ODD of aircraft have them; and where any number goes as far
+    as it may, or only the strongest gusts make sense, in which the tail meets them later or not. The latter is not
+    asked of an aircraft that the model follows poorly.
     """
     found = followed(flights, candidates, baseline, kind)
     if not kind.rotation and turns(about(found.flights, candidates, found.centre), found.known):
         turning = [followed(flights, candidates, baseline, other) for other in TURNING_KINDS]
         likely = max([found, *turning], key=lambda one: one.likelihood(candidates))
         rolls = [nuisance.name.startswith(("Cl_", "Cn_")) for nuisance in candidates.nuisances]
-        believed = likely is found or np.max(np.abs(likely.centre[rolls])) < MOVED
+        believed = likely is found or float(np.sum(likely.centre[rolls] ** 2)) < chi2.isf(ODD, sum(rolls))
         return [likely] if believed else [found, likely]
     told = all(flight.inadequacy.followed for flight in found.flights)
     doubtful = strongest(found.known) or bool(np.max(np.abs(found.centre)) >= MOVED)
