@@ -15,7 +15,8 @@ from sim2real.closing.discrepancy import Description
 from sim2real.library.candidates import SPREAD
 from sim2real.over_time.history import SAME, History
 from sim2real.posterior.form import at_home
-from sim2real.posterior.hypotheses import P_NONE, P_UNKNOWN, Hypothesis, Posterior
+from sim2real.posterior.hypotheses import Hypothesis, Posterior
+from sim2real.posterior.prior import P_NONE, P_UNKNOWN
 from sim2real.posterior.singles import EffectFit
 from sim2real.posterior.widened import interval
 from sim2real.records.reconstruct import Reconstruction

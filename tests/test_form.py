@@ -14,7 +14,6 @@ from sim2real.library.bends import bends, natural, of_own
 from sim2real.library.candidates import bank
 from sim2real.library.terms import BEYOND, GENERIC
 from sim2real.library.units import unit_of
-from sim2real.posterior.devices import within
 from sim2real.posterior.form import (
     ALIKE,
     DIRECTIONS,
@@ -33,7 +32,7 @@ from sim2real.posterior.form import (
 from sim2real.posterior.generic import UnknownFit, fit_unknown
 from sim2real.posterior.home_terms import gain, without
 from sim2real.posterior.home_terms import given as after_terms
-from sim2real.posterior.hypotheses import Hypothesis, is_home, set_prior
+from sim2real.posterior.hypotheses import Hypothesis, is_home
 from sim2real.posterior.likeness import PURE, SHAPE, alike, calibration, foreign, is_own, like
 from sim2real.posterior.sets import SetFit
 
@@ -124,14 +123,6 @@ def test_what_terms_take_of_noise_is_luck():
         gram = whole.T @ whole
         taken.append(gram[0, 0] - gain(gram[1:, 1:], gram[1:, 0], np.full(TERMS, 1e4), float(gram[0, 0])).least)
     assert np.mean(taken) < 0.5 * TERMS  # the worst of several ways; without luck all of TERMS and more
-
-
-def test_a_guest_is_a_fault_of_its_host_s_device():
-    assert within("elevator_gearing", ["elevator_lag"]) and within("thrust_loss", ["asymmetric_thrust"])
-    assert not within("asymmetric_thrust", ["thrust_loss"]) and not within("elevator_gearing", ["aileron_lag"])
-    assert within("inertia_error", ["lateral_cg"]) and not within("lateral_cg", ["inertia_error"])
-    assert not within("rudder_power", ["fin_ice"]) and not within("inertia_error", ["pitch_trim"])
-    assert set_prior(("elevator_gearing", "elevator_lag"), 50) < set_prior(("elevator_gearing", "aileron_lag"), 50)
 
 
 def test_terms_given_their_room_take_what_the_evidence_says_they_take() -> None:

@@ -27,18 +27,9 @@ from sim2real.posterior.forgiveness import forgive
 from sim2real.posterior.form import OTHER_FORM, SHARES, WORTH, Form, home, shares, with_terms
 from sim2real.posterior.generic import UnknownFit, fit_unknown_left
 from sim2real.posterior.home_terms import given
-from sim2real.posterior.hypotheses import (
-    P_BESIDE,
-    P_NONE,
-    P_UNKNOWN,
-    Hypothesis,
-    Posterior,
-    Settled,
-    is_home,
-    normalised,
-    set_prior,
-)
+from sim2real.posterior.hypotheses import Hypothesis, Posterior, Settled, is_home, normalised
 from sim2real.posterior.likeness import SHAPE, alike, split
+from sim2real.posterior.prior import set_prior, unknown_prior
 from sim2real.posterior.sets import SetFit
 from sim2real.signatures.courses import Remainder
 from sim2real.signatures.tempering import noise
@@ -239,8 +230,8 @@ class _Search:
         best = max(fits, key=lambda u: u.log_evidence)
         settled = flown.get(best.component, self._where(i))
         more = float(logsumexp([u.log_evidence for u in fits]) - np.log(len(fits)))
-        prior = np.log(P_BESIDE / (1.0 - P_NONE)) + known.log_prior if known.effects else np.log(P_UNKNOWN)
-        return [Hypothesis(known.fit, best, float(prior), known.log_evidence + gained + more,
+        prior = unknown_prior(known.log_prior if known.effects else None)
+        return [Hypothesis(known.fit, best, prior, known.log_evidence + gained + more,
                            Form((0.0,), (best.left,), self._at_liberty(known.fit).free(remainder, best)),
                            settled=settled)]
 

@@ -23,19 +23,9 @@ from sim2real.posterior.forgiveness import forgive
 from sim2real.posterior.form import Form, energies, may_bend, own_powers, own_terms, room, shares, squares, with_terms
 from sim2real.posterior.generic import UnknownFit, beside, fit_unknown
 from sim2real.posterior.home_terms import gain, without
-from sim2real.posterior.hypotheses import (
-    P_BESIDE,
-    P_NONE,
-    P_PAIRS,
-    P_TRIPLES,
-    P_UNKNOWN,
-    Hypothesis,
-    Posterior,
-    homes,
-    normalised,
-    set_prior,
-)
+from sim2real.posterior.hypotheses import Hypothesis, Posterior, homes, normalised
 from sim2real.posterior.likeness import split
+from sim2real.posterior.prior import P_NONE, set_prior, single_prior, unknown_prior
 from sim2real.posterior.sets import INTEGRATED, SetFit, firm, grow, integrate, pairs, sizes_tried
 from sim2real.posterior.singles import EffectFit, ambiguity, fit_family
 
@@ -147,7 +137,7 @@ def _known(reduced: FloatArray, bank: Bank, untestable: Sequence[str]) -> tuple[
     alternatives = {n: [e for f, e in by_family.items() if f.effect.name == n] for n in names}
     fits = {n: _best(own) for n, own in alternatives.items()}
     found = [Hypothesis(SetFit(misfit=float(reduced[0, 0])), None, np.log(P_NONE), 0.0)]
-    single = np.log((1.0 - P_NONE - P_UNKNOWN - P_PAIRS - P_TRIPLES - P_BESIDE) / max(len(names), 1))
+    single = single_prior(len(names))
     for name, own in alternatives.items():
         parameters = len({e.family.parameter.name for e in own})  # of equal prior; pieces of a range share one
         log = float(np.logaddexp.reduce([e.log_evidence for e in own]) - np.log(parameters))
@@ -239,8 +229,8 @@ def _with_unknown(reduced: FloatArray, raw: FloatArray, bank: Bank, known: Hypot
         return own, []
     best = max(fits, key=lambda u: u.log_evidence)
     gained = float(np.logaddexp.reduce([u.log_evidence for u in fits]) - np.log(len(fits)))
-    share = np.log(P_BESIDE / (1.0 - P_NONE)) + known.log_prior if known.effects else np.log(P_UNKNOWN)
-    return own, [Hypothesis(known.fit, best, float(share), known.log_evidence + gained)]
+    prior = unknown_prior(known.log_prior if known.effects else None)
+    return own, [Hypothesis(known.fit, best, prior, known.log_evidence + gained)]
 
 
 def _slopes(fit: SetFit) -> list[dict[int, float]]:

@@ -11,16 +11,12 @@ from scipy.special import logsumexp, softmax
 
 from icing_env.record import FloatArray
 from sim2real.posterior.any_delay import is_delay
-from sim2real.posterior.devices import within
 from sim2real.posterior.form import LEAST, Form, at_home
 from sim2real.posterior.generic import UnknownFit
 from sim2real.posterior.likeness import FORMED, MOSTLY, SHAPE, calibration, foreign, like, powered
 from sim2real.posterior.sets import SetFit
 from sim2real.posterior.singles import EffectFit
 
-# Prior (assumed): what is left is shared by single effects. A pair is about one per cent as likely as either member.
-P_NONE, P_UNKNOWN, P_PAIRS, P_TRIPLES, P_BESIDE = 0.8, 0.02, 0.028, 0.0008, 0.0028
-SAME_PLACE = 0.02  # of that where two members are faults of one device: another form of one is likelier (assumed)
 # Of the probability, that the evidence misleads: where the library's own form of one effect explains a gap; again for
 # each ten times that another form regains in log evidence, and at most, half of it for something unknown; where that is
 # what explains it; more where two effects are told; and in all where more are, or something unknown beside them. And
@@ -161,14 +157,6 @@ class Posterior:
     def leading(self, name: str) -> SetFit:
         """The most probable set that holds an effect."""
         return next(h.fit for h in self.hypotheses if name in h.effects)
-
-
-def set_prior(names: Sequence[str], testable: int) -> float:
-    """Log prior probability of a pair or triple of `testable` effects."""
-    n = testable
-    share = P_PAIRS / (n * (n - 1) / 2) if len(names) == 2 else P_TRIPLES / (n * (n - 1) * (n - 2) / 6)
-    guest = any(within(name, [other for other in names if other != name]) for name in names)
-    return float(np.log(share) + (np.log(SAME_PLACE) if guest else 0.0))
 
 
 def homes(found: Sequence[Hypothesis], alone: Sequence[UnknownFit], nothing: float,
