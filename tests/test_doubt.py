@@ -141,10 +141,22 @@ def test_company_of_another_form_is_less_by_what_forms_leave_elsewhere(regained,
              Hypothesis(one("updraft", "wing_ice"), None, -10.0, near + 10.0),
              Hypothesis(one("fin_ice", "updraft"), None, -10.0, 1e4),
              Hypothesis(one("fin_ice", "wing_ice"), None, -10.0, 50.0),
-             Hypothesis(one("wing_ice"), SOMETHING, -9.0, 50.0), Hypothesis(SetFit(), SOMETHING, -3.0, 80.0)]
+             Hypothesis(one("wing_ice"), SOMETHING, -9.0, 50.0), Hypothesis(SetFit(), SOMETHING, -3.0, -80.0)]
     less = [before.log_posterior - after.log_posterior
             for before, after in zip(found, _leaking(found, 0.0), strict=True)]
     assert less == pytest.approx([0.0, least, least, 0.0, 0.0, 0.0, 0.0], abs=1e-9)
+
+
+@pytest.mark.parametrize(("lead", "share"), [(0.5, 1.0), (1.5, 0.5), (2.0, 0.0), (9.0, 0.0)])
+def test_company_of_something_unknown_is_less_by_what_its_terms_leave_elsewhere(lead, share):
+    """They describe it as a form describes an effect: a little is left for another."""
+    alone = replace(SOMETHING, log_evidence=900.0)
+    most = elsewhere(900.0, 0.0)
+    found = [Hypothesis(SetFit(), alone, -4.0, 900.0),
+             Hypothesis(one("updraft"), alone, -10.0, 906.0 + lead * most),
+             Hypothesis(one("rudder_lag"), alone, -10.0, 906.0 + lead * most)]  # which no flight shows
+    less = [h.regained - after.regained for h, after in zip(found, _leaking(found, 0.0), strict=True)]
+    assert less == pytest.approx([0.0, share * most, 0.0], abs=1e-9)
 
 
 def test_company_is_less_by_less_the_farther_it_leads():

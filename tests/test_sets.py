@@ -34,8 +34,12 @@ def world() -> tuple[Bank, np.ndarray]:
     return candidates, rows
 
 
-def flown(sizes: dict[str, float], seed: int = 0, other: float = 0.0) -> tuple[Bank, np.ndarray]:
-    """Inner products of a record with these effects in it, and `other` noise units of something in no list."""
+def flown(sizes: dict[str, float], seed: int = 0, other: float = 0.0, terms: dict[int, float] | None = None
+          ) -> tuple[Bank, np.ndarray]:  # fmt: skip
+    """Inner products of a record with these effects in it, and `other` noise units of something in no list.
+
+    Or generic terms, so much of each by row.
+    """
     candidates, rows = world()
     rng = np.random.default_rng(seed)
     left = rng.standard_normal(SAMPLES) + other * np.sin(np.arange(SAMPLES)) * np.sqrt(2.0 / SAMPLES)
@@ -43,13 +47,15 @@ def flown(sizes: dict[str, float], seed: int = 0, other: float = 0.0) -> tuple[B
         if family.effect.name in sizes:
             for row, weight in flown_weights(family, sizes[family.effect.name]).items():
                 left = left - weight * rows[:, row]
+    for row, weight in (terms or {}).items():
+        left = left - weight * rows[:, row]
     all_rows = np.column_stack([left, rows[:, 1:]])
     n = len(candidates.nuisances)
     return candidates, with_prior(all_rows.T @ all_rows, candidates, np.eye(n), np.zeros(n))
 
 
-def weighed(sizes: dict[str, float], seed: int = 0) -> Posterior:
-    candidates, gram = flown(sizes, seed)
+def weighed(sizes: dict[str, float], seed: int = 0, terms: dict[int, float] | None = None) -> Posterior:
+    candidates, gram = flown(sizes, seed, terms=terms)
     return attribute(Linear(gram, candidates, (), np.zeros((len(candidates.nuisances),) * 2)))
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from icing_env.record import FloatArray
+from sim2real.flown.beside_unknown import accompanied
 from sim2real.flown.companions import companions, leading, together, told_by_paths, without
 from sim2real.flown.corrections import corrected, inherited, lost
 from sim2real.flown.liberty import AtLiberty
@@ -271,7 +272,7 @@ class _Search:
     def posterior(self) -> Posterior:
         """All hypotheses with their probabilities.
 
-        Something unknown is believed only beside what has been flown: nothing, the best single effect.
+        Something unknown is believed only beside what was flown, nothing or the best single effect, or as flown alone.
         """
         ranked, others = self._ranked(), list[Hypothesis]()
         found = list(self.found)
@@ -279,6 +280,7 @@ class _Search:
             found[i] = replace(found[i], form=with_terms(found[i].form, self._own(i)[0]), settled=self._where(i))
         for i in dict.fromkeys([self.nothing_at_all(), ranked[0], *self._ranked(1)[:1]]):
             others += self._beside(i) if i in self.left else []
+        others += accompanied(others, self.linear, self.flying.candidates)
         bound = found[ranked[0]].log_posterior
         chosen = [i for i, h in enumerate(found) if i in self.points or (h.unknown is None and h.log_posterior < bound)]
         flown, kept = [k for k, i in enumerate(chosen) if i in self.points], [found[i] for i in chosen] + others

@@ -87,8 +87,9 @@ def _leaking(found: Sequence[Hypothesis], nothing: float) -> list[Hypothesis]:
 
     No form is wholly a free course at the effect's own place; what it leaves at others goes with it, and is no second
     gap. Paths leave nothing in flights, and flights nothing in paths. Of what is farther behind than its form could
-    leave, the form is no reason for company.
+    leave, the form is no reason for company. What is unknown is no better described by its terms than by a form.
     """
+    strange = [(h.log_posterior, h.unknown) for h in found if h.unknown is not None and not h.effects]
     smaller = {h.effects: h for h in found if h.effects and h.unknown is None}
 
     def leaks(h: Hypothesis) -> float:
@@ -98,9 +99,18 @@ def _leaking(found: Sequence[Hypothesis], nothing: float) -> list[Hypothesis]:
                 most = elsewhere(smaller[some].regained, nothing - smaller[some].fit.misfit)
                 lead = h.log_posterior - smaller[some].log_posterior
                 out = max(out, float(np.clip(2.0 * most - lead, 0.0, most)))
+        for ahead, alone in strange if h.unknown is not None and h.effects else ():
+            if _leaves(alone, h.effects):
+                most = elsewhere(alone.log_evidence, 0.0)
+                out = max(out, float(np.clip(2.0 * most - (h.log_posterior - ahead), 0.0, most)))
         return out
 
     return [replace(h, regained=h.regained - leaks(h)) for h in found]
+
+
+def _leaves(alone: UnknownFit, company: Sequence[str]) -> bool:
+    """Whether what something unknown leaves could be told as effects."""
+    return alone.component not in PATHS[:-1] and any(not apart(effects.LIBRARY[name]) for name in company)
 
 
 def _reaches(some: Sequence[str], company: Sequence[str], unknown: UnknownFit | None) -> bool:
