@@ -58,6 +58,27 @@ def test_strangers_are_drawn_alone_each_in_turn_at_every_gust_and_are_in_no_othe
     assert draw.stranger_designs(20, 5) == draw.stranger_designs(20, 5) != draw.stranger_designs(20, 6)
 
 
+def test_beside_effects_of_the_library_an_unknown_one_enters_elsewhere():
+    drawn = draw.beside_designs(2 * len(effects.EFFECTS), 1)
+    assert {d.tier for d in drawn} == {"beside"}
+    assert {d.parts[0][:2] for d in drawn} == {(e.name, form) for e in effects.EFFECTS for form in ("same", "other")}
+    for (known, _, _), (strange, _, _) in (design.parts for design in drawn):
+        assert not {*effects.BY_NAME[known].where} & {*unknown.BY_NAME[strange].where}
+    assert len({d.parts[1][0] for d in drawn}) == len(unknown.UNKNOWN)
+    assert draw.beside_designs(20, 5) == draw.beside_designs(20, 5) != draw.beside_designs(20, 6)
+
+
+def test_what_is_known_keeps_its_size_and_what_is_unknown_stands_as_far_as_was_drawn(shape):
+    design = replace(NULL, tier="beside", target=12.0,
+                     parts=(("elevator_power", "same", -0.3), ("fuel_slosh", "same", 200.0)))  # fmt: skip
+    _, key = generate.make_case("a", design, shape)
+    assert key["parameters"]["elevator_power"] == {effects.BY_NAME["elevator_power"].parameter: -0.3}
+    assert key["D_strange"] == pytest.approx(12.0, rel=0.15)
+    assert key["D_known"] == pytest.approx(separation.distances(0, 1.0, shape, design.parts[:1]).none)
+    assert key["D_none"] > max(key["D_known"], key["D_strange"]) - 2.0  # both together
+    assert key["known"] == ["elevator_power"] and key["where_strange"] == sorted(unknown.BY_NAME["fuel_slosh"].where)
+
+
 def test_sizes_stay_within_what_the_protocol_allows():
     drawn = [part for d in draw.designs(2400, 1) if d.tier == "single" for part in d.parts]
     ratios = [abs(size / effects.BY_NAME[name].typical) for name, _, size in drawn]
@@ -171,7 +192,7 @@ def test_records_are_drawn_again_beside_their_keys(tmp_path, only_nulls):
 
 def test_names_of_a_sealed_set_are_random_and_in_no_order(tmp_path, only_nulls):
     of = draw.Population
-    strangers, wide, mixed = of(strangers=True), of(spread=0.08), of(gusts="mixed")
+    strangers, beside, wide, mixed = of(strangers=True), of(beside=True), of(spread=0.08), of(gusts="mixed")
     first, _, known = generate._roll(tmp_path / "a.json", 40, None, draw.USUAL)
     second, *_ = generate._roll(tmp_path / "b.json", 40, None, draw.USUAL)
     assert not known
@@ -182,12 +203,14 @@ def test_names_of_a_sealed_set_are_random_and_in_no_order(tmp_path, only_nulls):
         generate._roll(tmp_path / "a.json", 41, None, draw.USUAL)
     with pytest.raises(ValueError, match="another seed"):  # a sealed set is not finished as a development set
         generate._roll(tmp_path / "a.json", 40, 3, draw.USUAL)
-    with pytest.raises(ValueError, match="another seed"):  # nor as one of strangers
-        generate._roll(tmp_path / "a.json", 40, None, strangers)
+    for alone in (strangers, beside):
+        with pytest.raises(ValueError, match="another seed"):  # nor as one of these alone
+            generate._roll(tmp_path / "a.json", 40, None, alone)
     for other in (wide, mixed):
         with pytest.raises(ValueError, match="spread or gusts"):
             generate._roll(tmp_path / "a.json", 40, None, other)
-    assert len(generate._roll(tmp_path / "c.json", 40, None, strangers)[0]) == 40
+    for file, alone in (("c.json", strangers), ("d.json", beside)):  # no records with faults
+        assert len(generate._roll(tmp_path / file, 40, None, alone)[0]) == 40
 
 
 def test_derivatives_of_another_spread_are_off_by_as_many_deviations():

@@ -60,6 +60,11 @@ def test_singles_that_cannot_be_told_have_an_ideal_observer_beside(tmp_path):
 
 @pytest.fixture
 def perfect(tmp_path) -> tuple[Path, Path]:
+    return perfect_of(tmp_path)
+
+
+def perfect_of(tmp_path) -> tuple[Path, Path]:
+    """Answers to a set of the usual tiers, all right."""
     pairs = []
     for i in range(120):
         sigma, name, second = (0.0, 0.5, 1.5)[i % 3], NAMES[i % 20], NAMES[(i + 7) % 20]
@@ -147,6 +152,26 @@ def test_an_unknown_is_placed_where_it_is_one_of_the_components_that_it_enters_a
     true = [key("unknown", ["a"], 0.0), key("unknown", ["a", "c"], 0.0), key("unknown", ["a"], 0.0)]
     found = score.score(*write(tmp_path, [*zip(told, true, strict=True), (answer([]), key("unknown", ["a"], 0.0))]))
     assert found["unknown_placed"] == pytest.approx(2 / 3)  # of those told as unknown
+
+
+def test_an_effect_beside_an_unknown_one_is_told_where_both_are(tmp_path):
+    """Each counts by itself, too; a place is the unknown one's alone."""
+    def true(known: float, strange: float) -> dict:
+        return key("beside", ["a", "x"], 0.5, known=["a"], D_known=known, D_strange=strange, where_strange=["place_x"])
+
+    told = [(answer(["a"], unknown=True) | {"unknown": {"component": "place_x"}}, true(20.0, 9.0)),
+            (answer(["b"], unknown=True) | {"unknown": {"component": "place_a"}}, true(20.0, 9.0)),
+            (answer(["a"]), true(20.0, 4.0)), (answer([], unknown=True), true(5.0, 9.0)),
+            (answer([]), key("null", [], 0.5))]  # fmt: skip
+    found = score.score(*write(tmp_path, told))
+    tier = found["by_tier"]["beside"]
+    assert (tier["cases"], tier["right"], tier["exact_if_able"]) == (4, 0.25, 0.5)
+    assert (tier["has_known"], tier["has_unknown"], tier["placed"]) == (0.5, 0.75, 0.25)
+    assert found["unknown_auroc_above_8"] is None and found["pair_exact_set"] is None
+    (tmp_path / "usual").mkdir()
+    assert "beside" not in score.score(*perfect_of(tmp_path / "usual"))["by_tier"]
+    shown = [row[0] for row in run.tables(found | {"set": "x", "failures": []})[0][2]]
+    assert "beside: has known" in shown and "beside: placed" in shown
 
 
 def test_calibration_and_auroc_against_numbers_worked_out_by_hand():

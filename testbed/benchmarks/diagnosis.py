@@ -20,10 +20,11 @@ from testbed.withheld.files import read_json, tampered, write_text
 from testbed.withheld.generate import generate
 from testbed.withheld.manoeuvres import DIAGNOSED
 from testbed.withheld.refly import refly
+from testbed.withheld.score import BESIDE as ALSO
 from testbed.withheld.score import DETECTABLE, identifiable, score
 from testbed.workers import a_core_each
 
-QUICK, FULL, STRANGERS = 150, 2400, 40
+QUICK, FULL, STRANGERS, BESIDE = 150, 2400, 40, 24
 
 
 @a_core_each()
@@ -117,7 +118,12 @@ def kind_of(committed: Mapping[str, Any]) -> str:
     seed = "sealed" if committed["development_seed"] is None else "development"
     spread = f" spread {committed['spread']:g}" if "spread" in committed else ""
     gusts = f" gusts {committed['gusts']}" if "gusts" in committed else ""
-    return seed + spread + gusts + (" strangers" if "strangers" in committed else "")
+    return seed + spread + gusts + "".join(f" {of}" for of in ("strangers", "beside") if of in committed)
+
+
+def cases_of(population: Population, quick: bool) -> int:
+    """How many cases are drawn if it is not said."""
+    return STRANGERS if population.strangers else BESIDE if population.beside else QUICK if quick else FULL
 
 
 def removals(keys: Path) -> dict[str, str]:
@@ -184,6 +190,8 @@ def tables(found: dict[str, Any]) -> list[tuple[str, dict[str, str], list[list[s
                      text(found["mismatched_form"]["top1_by_gust"][gust]), ""])
     rows += [[f"{tier}: right", text(entry["right"]), f"of {entry['cases']}", "", ""]
              for tier, entry in found["by_tier"].items()]
+    rows += [[f"beside: {name.replace('_', ' ')}", text(entry[name]), "", "", ""]
+             for tier, entry in found["by_tier"].items() if tier == "beside" for name in ALSO]  # fmt: skip
     compared = {"solver": found, **found["baselines"]}
     shown = ("top1", "top3", "null_false_alarm", "where_f1", "ece", "log_score", "seconds_per_case")
     beside = [[name.replace("_", " "), *(text(figures[column]) for column in shown)]

@@ -9,7 +9,7 @@ from testbed.withheld.files import read_json
 from testbed.withheld.score import RIGHT, Case, flat
 
 LEFT_OUT = "left out"  # tier of single effects that were left out of the library
-TIERS = ("single", LEFT_OUT, "pair", "unknown", "null", "faults")
+TIERS = ("single", LEFT_OUT, "pair", "beside", "unknown", "null", "faults")
 HEADERS = {"tier": "left", "sigma_w, m/s": "right", "D": "right", "can be told": "left", "truth": "left",
            "answer": "left"}  # fmt: skip
 
@@ -21,7 +21,7 @@ def failures(answers: Path, keys: Path, without: Path | None = None) -> list[dic
         without: answers to single effects that were left out of the library, if there are any.
 
     Returns:
-        case, tier, sigma_w (m/s), D (to none; of unknown effects to the nearest pair), can_be_told (singles and pairs),
+        case, tier, sigma_w (m/s), D (to none; of unknown effects to the nearest pair), can_be_told (of known effects),
         truth and answer in words.
     """
     found = []
@@ -31,7 +31,7 @@ def failures(answers: Path, keys: Path, without: Path | None = None) -> list[dic
         if _wrong(case):
             near = key["D_pair"] if key["tier"] == "unknown" else key["D_none"]
             found.append({"case": path.stem, "tier": key["tier"], "sigma_w": key["sigma_w"], "D": near,
-                          "can_be_told": case["identifiable"] if key["tier"] in ("single", "pair") else None,
+                          "can_be_told": case["identifiable"] if key["tier"] in ("single", "pair", "beside") else None,
                           "truth": _truth(key), "answer": _told(answer)})  # fmt: skip
     for path in sorted(without.glob("*.json")) if without is not None else ():
         answer, key = read_json(path), read_json(keys / path.name)

@@ -52,6 +52,8 @@ icing benchmark diagnosis --jsbsim"""
 @click.option("--without", is_flag=True, help="diagnosis: also each effect in turn left out of the library.")
 @click.option("--rivals", is_flag=True, help="diagnosis: diagnoses of other kinds answer too, as baselines.")
 @click.option("--strangers", is_flag=True, help="diagnosis: only effects that nobody had in mind; 40 if not told.")
+@click.option("--beside", "company", is_flag=True,
+              help="diagnosis: only effects of the library with one of no list beside; 24 if not told.")
 @click.option("--spread", type=click.FloatRange(min=0.0, max=0.3), default=0.05, show_default=True,
               help="diagnosis: of the aircraft's derivatives about the published ones, one standard deviation.")
 @click.option("--gusts", type=click.Choice(GUSTS), default="later", show_default=True,
@@ -60,8 +62,9 @@ icing benchmark diagnosis --jsbsim"""
               help="diagnosis, recordings, elsewhere: processes.")
 def command(name: str, quick: bool, weights: Path | None, figure: Path | None, encounters: int | None,
             only: str | None, cases: int | None, fresh_seed: bool, out: Path, ledger: Path | None, workers: int,
-            without: bool, rivals: bool, strangers: bool, spread: float, gusts: str, pool: tuple[Path, ...],
-            publish: Path | None, jsbsim: bool, jsbsim_root: str | None, as_json: bool, seed: int) -> None:
+            without: bool, rivals: bool, strangers: bool, company: bool, spread: float, gusts: str,
+            pool: tuple[Path, ...], publish: Path | None, jsbsim: bool, jsbsim_root: str | None, as_json: bool,
+            seed: int) -> None:
     """Measure the testbed.
 
     `speed`: one aircraft and batches, with and without observer, one thread, beside JSBSim in the same run (if it is
@@ -99,12 +102,14 @@ def command(name: str, quick: bool, weights: Path | None, figure: Path | None, e
         _pooled(pool, as_json)
         return
     if name == "diagnosis":
-        from testbed.benchmarks.diagnosis import FULL, QUICK, STRANGERS, Population
+        from testbed.benchmarks.diagnosis import Population, cases_of
 
-        _diagnosis(cases or (STRANGERS if strangers else QUICK if quick else FULL), None if fresh_seed else seed,
-                   out / "strangers" if strangers else out, workers, as_json, without=without, rivals=rivals,
-                   ledger=ledger, published=publish,
-                   population=Population(strangers, spread, gusts, calibrated=True, rigged=True))  # fmt: skip
+        if strangers and company:
+            raise InputError("--beside: of another set than --strangers; give one of them")
+        drawn = Population(strangers, spread, gusts, calibrated=True, rigged=True, beside=company)
+        alone = "strangers" if strangers else "beside" if company else ""
+        _diagnosis(cases or cases_of(drawn, quick), None if fresh_seed else seed, out / alone, workers, as_json,
+                   without=without, rivals=rivals, ledger=ledger, published=publish, population=drawn)  # fmt: skip
         return
     if name in ("real_flight", "policies"):
         _cases(name, only, as_json)

@@ -67,7 +67,7 @@ class Design:
     level: float
     baseline: dict[str, float]
     seed: int
-    target: float = 0.0  # distance to the nearest pair of library effects that an unknown effect is scaled to
+    target: float = 0.0  # distance to the nearest pair of library effects that an unknown effect by itself is scaled to
     fault: Fault | None = None
     gusts: str = "later"
 
@@ -91,6 +91,7 @@ class Population(NamedTuple):
         calibrated: numbers of which one source or none tells are off as well, and instruments by what a calibration
             leaves: as in every set that is drawn today.
         rigged: gyros, the airframe's symmetry and surfaces are off as well: as in every set that is drawn today.
+        beside: effects of the library with one of no list beside alone.
     """
 
     strangers: bool = False
@@ -98,6 +99,12 @@ class Population(NamedTuple):
     gusts: str = "later"
     calibrated: bool = False
     rigged: bool = False
+    beside: bool = False
+
+    @property
+    def whole(self) -> bool:
+        """Whether every tier is drawn, and records with faults beside them."""
+        return not (self.strangers or self.beside)
 
     def told(self) -> dict[str, Any]:
         """What a manifest says of it: what is not as usual."""
@@ -155,6 +162,23 @@ def stranger_designs(count: int, seed: int) -> list[Design]:
         sigma = SIGMAS[(k % len(order) + k // len(order)) % 3]
         found.append(Design("unknown", ((chosen.name, "same", size_of(chosen, rng)),), *conditions(sigma, rng),
                             published_spread(rng), int(rng.integers(2**62)), _target(rng)))
+    return [found[i] for i in rng.permutation(count)]
+
+
+def beside_designs(count: int, seed: int) -> list[Design]:
+    """`count` cases of a library's effect, each in turn, with an unknown one beside it that enters nowhere it does."""
+    rng = np.random.default_rng(np.random.SeedSequence([seed, count, 7]))
+    order = [divmod(int(n), 2) for n in rng.permutation(2 * len(EFFECTS))]
+    found = []
+    for k in range(count):
+        index, form = order[k % len(order)]
+        known = EFFECTS[index]
+        apart = [effect for effect in UNKNOWN if not set(effect.where) & set(known.where)]
+        strange = apart[int(rng.integers(len(apart)))]
+        parts = tuple((effect.name, of, size_of(effect, rng))
+                      for effect, of in ((known, ("same", "other")[form]), (strange, "same")))  # fmt: skip
+        found.append(Design("beside", parts, *conditions(SIGMAS[k % 3], rng), published_spread(rng),
+                            int(rng.integers(2**62)), _target(rng)))
     return [found[i] for i in rng.permutation(count)]
 
 

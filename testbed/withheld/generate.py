@@ -10,7 +10,7 @@ import argparse
 import json
 import secrets
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,7 +18,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from testbed.withheld import files, published
-from testbed.withheld.draw import USUAL, Design, Population, designs, stranger_designs
+from testbed.withheld.draw import USUAL, Design, Population, beside_designs, designs, stranger_designs
+from testbed.withheld.effects import BY_NAME
 from testbed.withheld.faults import excused, fault_count, fault_designs, spoiled
 from testbed.withheld.flights import CATALOGUE, Aircraft, recorded
 from testbed.withheld.manoeuvres import DIAGNOSED, PLANS
@@ -44,7 +45,7 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
         seed: for development; from the operating system if omitted.
         workers: processes.
         progress: told after every group of cases.
-        population: without faults among strangers; distances in keys are those of the usual spread all the same.
+        population: what is drawn; distances in keys are those of the usual spread all the same.
 
     Returns:
         The manifest.
@@ -56,9 +57,7 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
     for folder in (records, keys):
         folder.mkdir(parents=True, exist_ok=True)
     names, seed, known = _roll(keys / "seed.json", cases, seed, population)
-    drawn = (stranger_designs(cases, seed) if population.strangers
-             else [*designs(cases, seed), *fault_designs(cases, seed)])  # fmt: skip
-    drawn = population.placed(drawn, seed)
+    drawn = population.placed(_designs(cases, seed, population), seed)
     jobs = [(name, design) for name, design in zip(names, drawn, strict=True)
             if not ((records / name).is_dir() and (keys / f"{name}.json").is_file())]
     groups = [list(group) for _, group in groupby(sorted(jobs, key=lambda job: bank_of(job[1])),
@@ -83,6 +82,12 @@ def generate(out: Path, cases: int, seed: int | None = None, workers: int = 1,
     return sealed
 
 
+def _designs(cases: int, seed: int, population: Population) -> list[Design]:
+    if population.whole:
+        return [*designs(cases, seed), *fault_designs(cases, seed)]
+    return beside_designs(cases, seed) if population.beside else stranger_designs(cases, seed)
+
+
 def _roll(path: Path, cases: int, seed: int | None, population: Population) -> tuple[list[str], int, bool]:
     """Names and seed of the set and whether it was given; kept with the keys: an interrupted draw goes on as begun."""
     if path.is_file():
@@ -97,7 +102,7 @@ def _roll(path: Path, cases: int, seed: int | None, population: Population) -> t
     seed = seed if seed is not None else secrets.randbits(120)
     rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
     names: list[str] = []
-    while len(names) < cases + (0 if population.strangers else fault_count(cases)):
+    while len(names) < cases + (fault_count(cases) if population.whole else 0):
         name = rng.bytes(5).hex() if given else secrets.token_hex(5)
         if name not in names:
             names.append(name)
@@ -175,19 +180,29 @@ def _flown(name: str, design: Design, parts: Parts,
 
 
 def _scaled(design: Design, shape: Geometry, parts: Parts, found: Distances) -> tuple[Parts, Distances]:
-    """An unknown effect at the size that stands `design.target` from the nearest pair, taken as proportional."""
-    factor = min(max(design.target / max(found.pair, 1e-6), SMALLEST_FACTOR), 1.0 / SMALLER)
-    smaller = tuple((effect, form, factor * size) for effect, form, size in parts)
-    there = distances(design.plan, design.gain, shape, smaller)
+    """An unknown effect at the size that stands `design.target` from the nearest pair, taken as proportional.
+
+    What is known beside it keeps its size: each is scaled, and measured, by itself.
+    """
+    def apart(parts: Parts) -> Distances:
+        return distances(design.plan, design.gain, shape, parts)
+
+    known, strange = (tuple(p for p in parts if (p[0] in BY_NAME) is held) for held in (True, False))
+    alone = apart(strange) if known else found
+    factor = min(max(design.target / max(alone.pair, 1e-6), SMALLEST_FACTOR), 1.0 / SMALLER)
+    smaller = tuple((effect, form, factor * size) for effect, form, size in strange)
+    there = apart(smaller)
     if there.pair < 0.3 * design.target:  # a dead zone or a delay that has vanished altogether
-        return parts, found
-    return smaller, there
+        smaller, there = strange, alone
+    if not known:
+        return smaller, there
+    return (*known, *smaller), replace(apart((*known, *smaller)), known=apart(known).none, strange=there.pair)
 
 
 def _key(name: str, design: Design, parts: Parts, found: Distances) -> dict[str, Any]:
     where = sorted({place for effect, _, _ in parts for place in CATALOGUE[effect].where})
     fault = None if design.fault is None else {**asdict(design.fault), "excused": excused(design.fault.channel)}
-    return {
+    key = {
         "case": name, "salt": secrets.token_hex(16), "tier": design.tier, "sigma_w": design.sigma,
         "effects": [effect for effect, _, _ in parts], "forms": [form for _, form, _ in parts],
         "parameters": {effect: {CATALOGUE[effect].parameter: size} for effect, _, size in parts},
@@ -195,6 +210,11 @@ def _key(name: str, design: Design, parts: Parts, found: Distances) -> dict[str,
         "D_own_set": found.own_set, "D_rival_set": found.rival_set, "fault": fault,
         "design": {k: v for k, v in asdict(design).items() if k not in ("tier", "parts", "fault")},
     }  # fmt: skip
+    if design.tier == "beside":
+        strange = [effect for effect, _, _ in parts if effect not in BY_NAME]
+        key |= {"known": [effect for effect, _, _ in parts if effect in BY_NAME], "D_known": found.known,
+                "D_strange": found.strange, "where_strange": sorted(CATALOGUE[strange[0]].where)}
+    return key
 
 
 def main() -> None:

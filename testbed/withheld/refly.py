@@ -31,7 +31,7 @@ from testbed.withheld.published import DERIVATIVES, SENSOR_KNOBS
 from testbed.withheld.windows import gap_of, held
 from testbed.workers import a_core_each, processes
 
-FLOWN_AGAIN = ("single", "pair")  # tiers with an effect that the library holds
+FLOWN_AGAIN = ("single", "pair", "beside")  # tiers with an effect that the library holds
 # All that the plant has to add to: derivatives, constants, instruments' errors, what describes something unknown.
 NUMBERS = {*DERIVATIVES, *SENSOR_KNOBS, *DESCRIBED, *OWN, *CENTRED, "CY_0", "Cl_0", "Cn_0", "Cl_alpha", "Cn_aileron",
            "Cm_CT", "CZ_CT", "Cm_alphadot", *(f"{s}_{own}" for s in ("elevator", "aileron", "rudder")

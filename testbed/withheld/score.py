@@ -27,7 +27,8 @@ HARMLESS = ("slow", "between", "engines", "powerless")  # what formats allow
 CLOSURES = {"published": ("before", "spread", "own_oracle", "after"),
             "effects_alone": ("before", "spread", "oracle", "effects_after"),
             "own": ("own_before", "noise", "own_oracle", "own_after")}  # fmt: skip
-RIGHT = {"null": "silent", "single": "top1", "pair": "exact", "unknown": "exact"}  # what counts, by tier
+RIGHT = {"null": "silent", "single": "top1", "pair": "exact", "unknown": "exact", "beside": "exact"}  # counts, by tier
+BESIDE = ("exact_if_able", "has_known", "has_unknown", "placed")  # also, of an effect with an unknown one beside
 Case = dict[str, Any]
 
 
@@ -52,8 +53,10 @@ def load(answers: Path, keys: Path, refly: Path | None = None) -> list[Case]:
 def flat(answer: dict[str, Any], key: dict[str, Any], flown: dict[str, Any] | None = None) -> Case:
     """What the figures need of one answer ({"error": ...} is wrong everywhere), its key, its model's gaps reflown."""
     hypotheses = sorted(answer.get("hypotheses", []), key=lambda h: -h["probability"])
-    truth = (frozenset(() if key["tier"] == "unknown" else key["effects"]), key["tier"] == "unknown")
-    listed = [_label(h) for h in hypotheses]
+    known = key.get("known", () if key["tier"] == "unknown" else key["effects"])  # told where one of no list is beside
+    truth = (frozenset(known), key["tier"] in ("unknown", "beside"))
+    listed, able = [_label(h) for h in hypotheses], identifiable(key)
+    exact = listed[:1] == [truth]
     near = (answer.get("verdict") == "explained" and not listed[0][1] and len(listed[0][0]) == 1
             and key["D"].get(*listed[0][0], math.inf) < SAME)
     inclusion = {name: sum(h["probability"] for h in hypotheses if name in h["effects"])
@@ -64,11 +67,12 @@ def flat(answer: dict[str, Any], key: dict[str, Any], flown: dict[str, Any] | No
         "effects": tuple(key["effects"]), "failed": "error" in answer, "none": key["D_none"], "pair": key["D_pair"],
         # By an ideal observer: half of those SAME from none, or as near to a rival as to their name (about).
         "ideal": NORMAL.cdf(key["D_none"] - SAME) * NORMAL.cdf(math.sqrt(max(_apart(key), 0.0)) / 2.0),
-        "identifiable": identifiable(key), "exact": listed[:1] == [truth], "top3": truth in listed[:3],
-        "top1": listed[:1] == [truth] or (bool(listed) and _in_class(answer, listed[0], key)),
+        "identifiable": able, "exact": exact, "exact_if_able": exact if able else None, "top3": truth in listed[:3],
+        "top1": exact or (bool(listed) and _in_class(answer, listed[0], key)),
         "alarm": answer.get("verdict") != "no_gap", "silent": answer.get("verdict") == "no_gap",
         "told_unknown": (unknown := answer.get("verdict") == "unknown"), "near": near, "open": near or unknown,
-        "placed": (answer.get("unknown") or {}).get("component") in key["where"],
+        "placed": (answer.get("unknown") or {}).get("component") in key.get("where_strange", key["where"]),
+        "has_known": bool(listed) and truth[0] <= listed[0][0], "has_unknown": bool(listed) and listed[0][1],
         "p_unknown": sum(h["probability"] for h in hypotheses if h["unknown"]),
         "p_truth": sum(h["probability"] for h in hypotheses if _label(h) == truth),
         "inclusion": [(p, name in key["effects"]) for name, p in sorted(inclusion.items())],
@@ -100,11 +104,9 @@ def _faulty(answer: dict[str, Any], key: dict[str, Any]) -> dict[str, Any]:
 def _closures(key: dict[str, Any], flown: dict[str, Any] | None) -> dict[str, tuple[float, float] | None]:
     """Closure of the answer and of the truth, as CLOSURES; None where not flown again or no gap is to be closed."""
     found: dict[str, tuple[float, float] | None] = dict.fromkeys(CLOSURES)
-    if flown is None:
-        return found
-    held = key["held_out"]
+    held = key.get("held_out", {})
     for kind, (gap, least, true, after) in CLOSURES.items():
-        if held[gap] > held[least] and after in flown:
+        if flown and after in flown and held[gap] > held[least]:
             found[kind] = (1.0 - flown[after] / held[gap], 1.0 - held[true] / held[gap])
     return found
 
@@ -117,14 +119,15 @@ def _apart(key: dict[str, Any]) -> float:
     """Whitened square by which an effect (a pair) is nearer to its name than to other effects (and pairs)."""
     own, rival = key.get("D_own_set") or 0.0, key.get("D_rival_set") or 0.0  # not there before 24 November 2026
     if key["tier"] == "single":
-        own = key["D"][key["effects"][0]]
-        rival = min(d for name, d in key["D"].items() if name not in key["effects"])
+        own, rival = key["D"][key["effects"][0]], min(d for n, d in key["D"].items() if n not in key["effects"])
     return float(rival**2 - own**2)
 
 
 def identifiable(key: dict[str, Any]) -> bool:
     """Whether an ideal observer could name one effect or a pair: it stands out, nearer to its name than to others."""
-    return key["D_none"] >= DETECTABLE and _apart(key) >= APART**2
+    if key["tier"] == "beside":  # each of both, by itself
+        return bool(key["D_known"] >= DETECTABLE and key["D_strange"] >= APART)
+    return bool(key["D_none"] >= DETECTABLE and _apart(key) >= APART**2)
 
 
 def _in_class(answer: dict[str, Any], first: tuple[frozenset[str], bool], key: dict[str, Any]) -> bool:
@@ -157,10 +160,8 @@ def share(values: Sequence[Any]) -> float | None:
 
 def auroc(positive: Sequence[float], negative: Sequence[float]) -> float | None:
     """Probability that a positive scores above a negative, ties counted half."""
-    if not positive or not negative:
-        return None
     p, n = np.asarray(positive)[:, None], np.asarray(negative)
-    return float(np.mean((p > n) + 0.5 * (p == n)))
+    return float(np.mean((p > n) + 0.5 * (p == n))) if p.size and n.size else None
 
 
 def _unknown(cases: Sequence[Case], low: float, high: float) -> tuple[list[float], list[float]]:
@@ -175,9 +176,7 @@ def _unknown(cases: Sequence[Case], low: float, high: float) -> tuple[list[float
 
 def tpr_at(positive: Sequence[float], negative: Sequence[float], false: float = 0.05) -> float | None:
     """Share of positives above the threshold that `false` of the negatives exceed."""
-    if not positive or not negative:
-        return None
-    return float(np.mean(np.asarray(positive) > np.quantile(negative, 1.0 - false)))
+    return float(np.mean(np.asarray(positive) > np.quantile(negative, 1.0 - false))) if positive and negative else None
 
 
 def calibration_error(cases: Sequence[Case], by_luck: bool = False) -> float | None:
@@ -256,9 +255,10 @@ def _shares(cases: Sequence[Case], right: str, *others: str) -> dict[str, Any]:
 
 def by_tier(cases: Sequence[Case], without: Sequence[Case]) -> dict[str, Any]:
     """Each tier by itself, with every effect's recall; `without`: right where unknown or a rival within D of SAME."""
-    of = {tier: [c for c in cases if c["tier"] == tier] for tier in ("null", "single", "pair", "unknown", "faults")}
-    tiers = {tier: _shares(of[tier], rule) | {"detectable": sum(c["none"] >= DETECTABLE for c in of[tier])}
-             for tier, rule in RIGHT.items()}  # fmt: skip
+    of = {tier: [c for c in cases if c["tier"] == tier] for tier in (*RIGHT, "faults")}
+    tiers = {tier: _shares(of[tier], rule, *(BESIDE if tier == "beside" else ()))
+             | {"detectable": sum(c["none"] >= DETECTABLE for c in of[tier])}
+             for tier, rule in RIGHT.items() if of[tier] or tier != "beside"}  # fmt: skip
     clear = [c for c in cases if c["identifiable"] and c["tier"] == "single"]
     tiers["single"]["recall"] = {n: share([c["top1"] for c in clear if c["effects"] == (n,)])
                                  for n in sorted({c["effects"][0] for c in clear})}  # fmt: skip

@@ -97,6 +97,7 @@ class Distances:
     """D from none; from each library effect, its size free; from the nearest pair of them.
 
     own_set, rival_set: of a pair, from itself in the library's forms, and from the nearest other pair or single effect.
+    known, strange: of an effect beside an unknown one, each by itself: from none, and from the nearest pair.
     """
 
     none: float
@@ -104,6 +105,8 @@ class Distances:
     pair: float
     own_set: float | None = None
     rival_set: float | None = None
+    known: float | None = None
+    strange: float | None = None
 
 
 def distances(plan: int, gain: float, g: Geometry, parts: Sequence[Part]) -> Distances:
