@@ -131,24 +131,31 @@ def _laws(paths: Sequence[_Path]) -> list[tuple[FloatArray, float] | None]:
 
 
 def _at_their_rate(paths: Sequence[_Path]) -> Sequence[_Path]:
-    """The same behind an actuator of another rate limit, which no source tells, where that leaves plainly less."""
+    """The same behind an actuator of another rate limit, which no source tells, where that leaves plainly less.
+
+    A gear in front of the actuator is the inverse of such a limit behind it: that one is as likely as the published.
+    """
     if not any(path.limited() for path in paths):
         return paths
 
     def of(quick: float) -> _Fit:
         return _Fit([replace(path, quick=quick) for path in paths], GEARED)
 
-    before = of(1.0).square(lag := _lag(of(1.0).square, paths[0].published))
-    if min(of(quick).square(lag) for quick in ANOTHER) > before:
-        return paths
+    in_front = 1.0
+    for _ in range(TURNS):
+        lag = _lag((fit := of(in_front)).square, paths[0].published)
+        in_front = 1.0 / float(fit.weights(fit.seen(lag))[0][0])
+    before, kept = min((of(quick).square(lag), quick) for quick in (1.0, in_front))
+    if min(of(kept * other).square(lag) for other in ANOTHER) > before:
+        return of(kept).paths
     for _ in range(TURNS):  # a slow actuator passes for a late one, and the other way about
         found = minimize_scalar(lambda log, lag=lag: of(float(np.exp(log))).square(lag), bounds=RATES, method="bounded",
-                                options={"xatol": 0.01})  # fmt: skip
+                                options={"xatol": 1e-3})  # fmt: skip
         quick = float(np.exp(found.x))
         lag = _lag(of(quick).square, paths[0].published)
     noise = max(float(np.median([white(path.recorded) for path in paths])), *(path.least for path in paths), 1e-9)
     enough = 2.0 * np.log(sum(len(path.recorded) for path in paths))
-    return of(quick).paths if before - of(quick).square(lag) > enough * noise**2 else paths
+    return of(quick if before - of(quick).square(lag) > enough * noise**2 else kept).paths
 
 
 def _law(paths: Sequence[_Path]) -> list[tuple[FloatArray, float] | None]:
@@ -160,7 +167,8 @@ def _law(paths: Sequence[_Path]) -> list[tuple[FloatArray, float] | None]:
     """
     published = paths[0].published
     fits = [_Fit(paths, terms) for terms in (NOTHING, GEARED, EVERY)]
-    laws = [(fits[0], published, 0), *((fit, _lag(fit.square, published), 1 + fit.count) for fit in fits)]
+    laws = [*((fit, published, fit.count) for fit in fits[:2]),
+            *((fit, _lag(fit.square, published), 1 + fit.count) for fit in fits)]  # fmt: skip
     noise = max(float(np.median([white(left) for left in fits[-1].left(laws[-1][1])])),
                 *(path.least for path in paths), 1e-9)
     n = sum(len(path.recorded) for path in paths)
@@ -190,19 +198,19 @@ class _Fit:
 
     def positions(self, lag: float) -> list[FloatArray]:
         """Of every record [N], before the recording's low pass."""
-        return self._of([path.behind(lag, filtered=False) for path in self.paths], *self._weights(self._seen(lag)))
+        return self._of([path.behind(lag, filtered=False) for path in self.paths], *self.weights(self.seen(lag)))
 
     def left(self, lag: float) -> list[FloatArray]:
         """What the recorded positions have beside."""
-        seen = self._seen(lag)
+        seen = self.seen(lag)
         return [path.recorded - there[path.good]
-                for path, there in zip(self.paths, self._of(seen, *self._weights(seen)), strict=True)]
+                for path, there in zip(self.paths, self._of(seen, *self.weights(seen)), strict=True)]
 
-    def _seen(self, lag: float) -> list[Parts]:
+    def seen(self, lag: float) -> list[Parts]:
         """What the law is made of behind the recording's low pass."""
         return [path.behind(lag) for path in self.paths]
 
-    def _weights(self, seen: list[Parts]) -> tuple[FloatArray, list[FloatArray]]:
+    def weights(self, seen: list[Parts]) -> tuple[FloatArray, list[FloatArray]]:
         """Those of the aircraft, and of every record; the position itself where none is fitted."""
         shared, own = self.terms
         parts = [tuple(part[path.good] for part in both) for both, path in zip(seen, self.paths, strict=True)]
