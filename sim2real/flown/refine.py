@@ -278,9 +278,11 @@ class _Search:
         found = list(self.found)
         for i in ranked:
             found[i] = replace(found[i], form=with_terms(found[i].form, self._own(i)[0]), settled=self._where(i))
-        for i in dict.fromkeys([self.nothing_at_all(), ranked[0], *self._ranked(1)[:1]]):
+        tried = dict.fromkeys([self.nothing_at_all(), ranked[0], *self._ranked(1)[:1]])
+        for i in tried:
             others += self._beside(i) if i in self.left else []
-        others += accompanied(others, self.linear, self.flying.candidates)
+        more = accompanied(others, self.linear, self.flying.candidates)
+        others += [h for h in more if h.effects not in {found[i].effects for i in tried}]  # these are known better
         bound = found[ranked[0]].log_posterior
         chosen = [i for i, h in enumerate(found) if i in self.points or (h.unknown is None and h.log_posterior < bound)]
         flown, kept = [k for k, i in enumerate(chosen) if i in self.points], [found[i] for i in chosen] + others
