@@ -144,7 +144,7 @@ def _at_their_rate(paths: Sequence[_Path]) -> Sequence[_Path]:
     in_front = 1.0
     for _ in range(TURNS):
         lag = _lag((fit := of(in_front)).square, paths[0].published)
-        in_front = 1.0 / float(fit.weights(fit.seen(lag))[0][0])
+        in_front = 1.0 / float(np.clip(fit.weights(fit.seen(lag))[0][0], *np.exp(RATES)))  # a dead one has none
     before, kept = min((of(quick).square(lag), quick) for quick in (1.0, in_front))
     if min(of(kept * other).square(lag) for other in ANOTHER) > before:
         return of(kept).paths
