@@ -10,8 +10,8 @@ from scipy.signal import lfilter
 
 from icing_env import effects, scenario
 from icing_env.record import FlightRecord
-from sim2real.actuators.lateness import lateness
-from sim2real.actuators.paths import follow, late_squares
+from sim2real.actuators.lateness import late_square, lateness
+from sim2real.actuators.paths import follow
 from sim2real.diagnosis import diagnose
 from sim2real.posterior.any_delay import late_fits
 from sim2real.posterior.form import FORGIVEN
@@ -52,6 +52,18 @@ def test_a_delay_is_found_as_long_as_it_is(surface: str, samples: int):
     assert late.left < 0.05
 
 
+@pytest.mark.parametrize(("gear", "offset"), [(0.99, 1.2e-3), (1.015, -5e-4)])
+def test_a_delay_of_a_surface_that_is_rigged_a_little_off_is_all_that_there_is(gear: float, offset: float):
+    flights = []
+    for seed in (4, 5):
+        flight = reconstruct(asked_early(seed, "elevator", 6))
+        rigged = flight.positions | {"elevator": gear * flight.positions["elevator"] + offset}
+        flights.append(replace(flight, positions=rigged))
+    late = lateness(flights, [f.parameters for f in flights])["elevator_path"]
+    assert late.delay == pytest.approx(0.12, abs=0.003)
+    assert late.left < 0.02
+
+
 def test_surfaces_that_answer_as_published_are_not_late():
     flights = [reconstruct(flown(seed)) for seed in (4, 5)]
     assert late_fits(lateness(flights, [f.parameters for f in flights]), 0.0, 1.0) == []
@@ -76,7 +88,7 @@ def test_a_low_pass_that_gives_way_makes_no_delay_of_what_is_smoothed():
     smooth = follow(command, first, slow, "elevator", flight.dt)[:, 0]
     late = np.concatenate([np.repeat(smooth[:1], 2), smooth[:-2]])
     flight = replace(flight, positions=flight.positions | {"elevator": late})
-    assert late_squares(flight, slow, "elevator", np.array([0.04]))[0] < 1.0  # so smoothed, it is late and no more
+    assert late_square([(flight, slow)], "elevator", 0.04) < 1.0  # so smoothed, it is late and no more
     found = lateness([flight], [slow])
     assert found["elevator_path"].left > FORGIVEN**2
     assert late_fits(found, 0.0, 1.0) == []

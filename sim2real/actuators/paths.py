@@ -56,19 +56,6 @@ def path_residuals(flight: Reconstruction, parameters: NDArray,
     return out + _engine_residuals(flight, parameters)
 
 
-def late_squares(flight: Reconstruction, parameters: NDArray, surface: str, delays: FloatArray,
-                 first: int = 0) -> FloatArray:  # fmt: skip
-    """Whitened square that a path leaves if it answers as one PARAMETERS row has it, but for each of some delays [s].
-
-    Args:
-        first: sample from which it counts.
-    """
-    predicted = answered(flight, surface, parameters)[:, 0]
-    time = flight.dt * np.arange(len(predicted))
-    late = np.column_stack([np.interp(time - delay, time, predicted) for delay in delays])
-    return np.asarray(np.sum(believed(flight, surface, late)[first:] ** 2, axis=0))
-
-
 def answered(flight: Reconstruction, surface: str, parameters: NDArray) -> FloatArray:
     """Position [N, rows] of a surface behind its recorded command, from where it was recorded first."""
     measured = flight.positions[surface]
