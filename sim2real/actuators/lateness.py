@@ -1,8 +1,7 @@
 """Surfaces that answer whole and late: a pure delay between command and position, which no lag and no limit is.
 
 A transport delay (a digital actuator loop, slack that is taken up first, a hydraulic line) leaves the shape of an
-answer as it was. Lags and limits say much of one, by shapes that it has not. How the surface is rigged, and how its
-position is picked up, is as uncertain as everywhere: a gear that is off by a hundredth is no other shape.
+answer as it was. Lags and limits say much of one, by shapes that it has not.
 """
 
 from __future__ import annotations
@@ -15,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from icing_env.record import FloatArray
-from sim2real.actuators.paths import answered, believed, counted, moving
-from sim2real.library.candidates import PICK_UPS
+from sim2real.actuators.paths import answered, counted, moving
+from sim2real.actuators.rigged import squares_left
 from sim2real.records.channels import SURFACES
 from sim2real.records.reconstruct import Reconstruction
 
@@ -68,22 +67,18 @@ def _square(surface: str, first: int, there: Sequence[tuple[Reconstruction, NDAr
 
 
 def late_square(there: Sequence[tuple[Reconstruction, NDArray]], surface: str, delay: float, first: int = 0) -> float:
-    """Whitened square that a path leaves if it answers as its rows have it, but for a delay [s], rigged as is likeliest.
+    """Whitened square that a path leaves if it answers as its rows have it, but for a delay [s], rigged as is likely.
 
     Args:
         there: of `moving`.
         first: sample from which it counts.
     """
-    gear, offset = (PICK_UPS[f"{surface}_{of}"] for of in ("gearing", "offset"))
-    gram = np.diag([0.0, 1.0, 1.0])
+    answers = []
     for flight, row in there:
-        answer = answered(flight, surface, row)[:, 0]
+        answer = answered(flight, surface, row)
         time = flight.dt * np.arange(len(answer))
-        late = np.interp(time - delay, time, answer)
-        left = believed(flight, surface, np.column_stack([late, late * (1.0 + gear), late + offset]))[first:]
-        left[:, 1:] -= left[:, :1]
-        gram += left.T @ left
-    return float(gram[0, 0] - gram[0, 1:] @ np.linalg.solve(gram[1:, 1:], gram[1:, 0]))
+        answers.append((flight, np.interp(time - delay, time, answer[:, 0])[:, None]))
+    return float(squares_left(answers, surface, first)[0])
 
 
 def _best(moved: Square, noise: float) -> Late | None:

@@ -37,12 +37,14 @@ def bends(effect: Effect) -> frozenset[tuple[str, str]]:
 
     Or of the reading that it scales: no instrument's calibration is quite a line. An offset may go with time as far as
     it goes, one of a moment or force with speed as well. Thrust goes with speed; of two engines that are not alike it
-    may be one alone that is not as published.
+    may be one alone that is not as published. No gear is quite a line, either.
     """
     if channel := scales(effect):
         return frozenset({(f"sensor:{channel}", f"{channel}*{channel}")})
     if channel := shifts(effect):
         return frozenset((f"sensor:{channel}", term) for term in ("time", *WANDERING))
+    if surface := _alone(effect, "", "_gearing"):
+        return frozenset({(f"{surface}_path", "position"), (f"{surface}_path", "position*position*position")})
     if changes(effect) and changes(effect) <= set(THRUST):
         return frozenset(("propulsion", term) for term in _of_thrust(effect))
     if len(changes(effect)) == 1 and (component := COMPONENTS.get(next(iter(changes(effect))).removesuffix("_0"))):
@@ -69,19 +71,19 @@ def _of_both_engines(effect: Effect) -> bool:
 @cache
 def scales(effect: Effect) -> str:
     """The channel whose reading an effect scales, where it does nothing else; empty if there is none."""
-    return _alone(effect, "scale_")
+    return _alone(effect, "scale_", "")
 
 
 @cache
 def shifts(effect: Effect) -> str:
     """The channel whose reading an effect adds to, where it does nothing else; empty if there is none."""
-    return _alone(effect, "bias_")
+    return _alone(effect, "bias_", "")
 
 
-def _alone(effect: Effect, kind: str) -> str:
-    """The channel of the one number of a kind that an effect changes, if it changes no other; else empty."""
-    changed = changes(effect)
-    return next((name.removeprefix(kind) for name in changed if name.startswith(kind) and len(changed) == 1), "")
+def _alone(effect: Effect, begins: str, ends: str) -> str:
+    """What the one number of a kind is of that an effect changes, if it changes no other; else empty."""
+    number = next(iter(changes(effect))) if len(changes(effect)) == 1 else ""
+    return number[len(begins) : len(number) - len(ends)] if number.startswith(begins) and number.endswith(ends) else ""
 
 
 @cache

@@ -61,11 +61,17 @@ def _in_company(found: Sequence[Hypothesis]) -> list[Hypothesis]:
             plain, free = one.fit.misfit - h.fit.misfit, one.form.free[0].beyond - there.beyond
             other = max(plain, free)  # what the other explains
             form = SHARES[-1] ** 2 * other if other > LEAST**2 else 0.0
+            form += max(_by_other_terms(h) - _by_other_terms(one), 0.0)  # the other's form is no guess
             out.append(one.regained + 0.5 * (max(free - plain, 0.0) + form))
         return min(out)
 
     return _in_larger([replace(h, regained=min(h.regained, most(h))) if len(h.effects) == 2 and h.unknown is None else h
                        for h in found])  # fmt: skip
+
+
+def _by_other_terms(h: Hypothesis) -> float:
+    """Whitened square that a set leaves less where terms that say it better are in its place."""
+    return 0.0 if h.instead is None else max(h.fit.misfit - h.instead.left, 0.0)
 
 
 def _in_larger(found: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -5,7 +5,7 @@ Linear-Gaussian terms (constant, linear, quadratic, drifting) whose coefficients
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -116,6 +116,14 @@ def fit_unknown_left(left: FloatArray, bank: Bank) -> list[UnknownFit]:
     """The same of what a flown set leaves (row 0, then generic terms); weights by row of the bank."""
     return [replace(u, weights={bank.terms[row - 1].row: w for row, w in u.weights.items()})
             for u in fit_unknown(left, replace(bank, terms=in_what_is_left(bank.terms)))]
+
+
+def fit_some_left(left: FloatArray, bank: Bank, chosen: Collection[tuple[str, str]]) -> UnknownFit | None:
+    """The same of some terms of one component, by (component, name); none where these make nothing of the records."""
+    few = tuple(term for term in bank.terms if (term.component, term.name) in chosen)
+    rows = [0, *(row for row, term in enumerate(bank.terms, 1) if term in few)]
+    found = fit_unknown_left(left[np.ix_(rows, rows)], replace(bank, terms=few))
+    return found[0] if found else None
 
 
 def _one(T: FloatArray, t: FloatArray) -> Way:

@@ -13,7 +13,7 @@ from icing_env.record import FloatArray
 from sim2real.posterior.any_delay import is_delay
 from sim2real.posterior.form import LEAST, Form, at_home
 from sim2real.posterior.generic import UnknownFit
-from sim2real.posterior.likeness import FORMED, MOSTLY, SHAPE, calibration, foreign, like, powered
+from sim2real.posterior.likeness import FORMED, MOSTLY, SHAPE, bent_gear, calibration, foreign, like, powered
 from sim2real.posterior.sets import SetFit
 from sim2real.posterior.singles import EffectFit
 
@@ -187,6 +187,8 @@ def is_home(h: Hypothesis, unknown: UnknownFit, told: float, explained: float, r
     """
     if len(h.effects) != 1 or h.unknown is not None or not at_home(unknown.component, h.effects) or is_delay(unknown):
         return False
+    if bent_gear(h.fit, unknown):
+        return True
     formed = h.form is not None and told + unknown.misfit - h.form.least > FORMED * told
     if foreign(h.effects[0], unknown, raw) and explained < (MOSTLY if formed else SHAPE) * told:
         return False

@@ -60,6 +60,14 @@ def like(fit: SetFit, unknown: UnknownFit, raw: FloatArray, share: float) -> boo
     return _bent(fit, unknown) or (share > SOME and _share(own, unknown, raw) > SHAPE)
 
 
+def bent_gear(fit: SetFit, unknown: UnknownFit) -> bool:
+    """Whether generic terms are a gear that bends, of a surface whose gearing a set changes, however little that says.
+
+    Its cube may undo its line over the commands that were flown, and nothing else on a path is a line and its cube.
+    """
+    return unknown.component.endswith("_path") and _bent(fit, unknown)
+
+
 def calibration(name: str, unknown: UnknownFit, raw: FloatArray) -> bool:
     """Whether generic terms are mostly a function of the one reading that an effect scales, or an offset of it.
 
@@ -114,6 +122,8 @@ def is_own(fit: SetFit, unknown: UnknownFit, nothing: float, raw: FloatArray, ex
         explained: of `form.energies`.
     """
     able = [most for family, most in zip(fit.families, explained, strict=True) if _may_be(family.effect, unknown)]
+    if bent_gear(fit, unknown):
+        return True
     if nothing - fit.misfit <= LEAST**2 or not able:
         return False
     taken = fit.misfit - unknown.misfit

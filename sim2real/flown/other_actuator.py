@@ -1,0 +1,70 @@
+"""What faults of an actuator mostly are where they are not as the library has them: explicit, and weighed as that.
+
+A lag of second order instead of first, a gear that bends instead of one that is a line. Whatever generic terms at home
+could do is forgiven by as much as the library's own form explains, which of a gear whose cube undoes its line, or of a
+servo that overshoots, is little.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from icing_env.record import FloatArray
+from sim2real.actuators.second_order import DAMPINGS, SecondOrder, second_order
+from sim2real.flown.points import Flying, rows_of
+from sim2real.flown.steps import Point
+from sim2real.library.bends import bends
+from sim2real.posterior.generic import UnknownFit, fit_some_left
+from sim2real.posterior.sets import SetFit
+from sim2real.records.channels import SURFACES
+from sim2real.signatures.whitening import SETTLE
+
+SECOND_ORDER = "second order"
+
+
+def other_actuator(flying: Flying, fit: SetFit, point: Point, left: FloatArray) -> UnknownFit | None:
+    """A set with its actuators' faults in these forms, where that leaves less; all told, and what is left.
+
+    Args:
+        point: where the set was flown.
+        left: of `Remainder.reduced` there.
+    """
+    found = [*_lags(flying, fit, point), *_gears(flying, fit, left)]
+    if not found:
+        return None
+    gained, taken = (sum(getattr(u, of) for u in found) for of in ("log_evidence", "misfit"))
+    weights = {row: w for u in found for row, w in u.weights.items()}
+    return UnknownFit(found[0].component, fit.log_evidence + gained, tuple(term for u in found for term in u.terms),
+                      fit.misfit + taken, weights)  # fmt: skip
+
+
+def _lags(flying: Flying, fit: SetFit, point: Point) -> list[UnknownFit]:
+    """Actuators of second order for every lag: evidence and misfit more than the set's.
+
+    The lag that the set has pays for the frequency, a damping as likely anywhere in its range for itself.
+    """
+    late = [surface for surface in SURFACES if f"{surface}_lag" in fit.effects]
+    if not late:
+        return []
+    flights, first = flying.flights, round(SETTLE / flying.flights[0].dt)
+    still = np.zeros(len(point.sizes))
+    rows = [rows_of(f, flying.candidates, fit, point.sizes, still, point.nuisances)[:1] for f in flights]
+    found = {surface: second_order(flights, rows, surface, first) for surface in late}
+    return [_told(surface, actuator, flying.tempering) for surface, actuator in found.items() if actuator is not None]
+
+
+def _told(surface: str, actuator: SecondOrder, tempering: float) -> UnknownFit:
+    gain = actuator.gain / tempering
+    width = np.sqrt(2.0 * np.pi * tempering) * actuator.error / (DAMPINGS[1] - DAMPINGS[0])
+    term = (SECOND_ORDER, actuator.frequency, actuator.error)
+    return UnknownFit(f"{surface}_path", 0.5 * gain + float(np.log(min(width, 1.0))), (term,), -gain, {})
+
+
+def _gears(flying: Flying, fit: SetFit, left: FloatArray) -> list[UnknownFit]:
+    """Gears that bend for every gearing whose surface has no lag: evidence and misfit more than the set's."""
+    bent = [bends(family.effect) for family in fit.families if family.effect.name.endswith("_gearing")
+            and family.effect.name.replace("_gearing", "_lag") not in fit.effects]  # fmt: skip
+    found = [fit_some_left(left, flying.candidates, own) for own in bent]
+    return [replace(u, misfit=u.misfit - float(left[0, 0])) for u in found if u is not None and u.log_evidence > 0.0]
