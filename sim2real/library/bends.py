@@ -115,8 +115,9 @@ def _regressors(effect: Effect, component: str) -> set[str]:
 
 @cache
 def powerless(effect: Effect) -> bool:
-    """Whether an effect changes coefficients of the airframe alone, none of them one of thrust."""
-    return _of_coefficients(effect) and not any("CT" in name for name in changes(effect))
+    """Whether an effect changes the airframe alone: coefficients, none of them one of thrust, or how it is loaded."""
+    loading = all(name == "mass" or name.startswith(("inertia_", "cg_shift_")) for name in changes(effect))
+    return loading or (_of_coefficients(effect) and not any("CT" in name for name in changes(effect)))
 
 
 def _of_coefficients(effect: Effect) -> bool:

@@ -13,7 +13,7 @@ from icing_env.record import FloatArray
 from sim2real.posterior.any_delay import is_delay
 from sim2real.posterior.form import LEAST, Form, at_home
 from sim2real.posterior.generic import UnknownFit
-from sim2real.posterior.likeness import FORMED, MOSTLY, SHAPE, bent_gear, calibration, foreign, like, powered
+from sim2real.posterior.likeness import FORMED, MOSTLY, POWERED, SHAPE, bent_gear, calibration, foreign, like, powered
 from sim2real.posterior.sets import SetFit
 from sim2real.posterior.singles import EffectFit
 
@@ -192,7 +192,7 @@ def is_home(h: Hypothesis, unknown: UnknownFit, told: float, explained: float, r
     formed = h.form is not None and told + unknown.misfit - h.form.least > FORMED * told
     if foreign(h.effects[0], unknown, raw) and explained < (MOSTLY if formed else SHAPE) * told:
         return False
-    if powered(h.effects[0], unknown) and explained < SHAPE * told:
+    if powered(h.effects[0], unknown) and explained < POWERED * told:
         return False
     return told > 0.0 and (calibration(h.effects[0], unknown, raw) or (explained > LEAST**2 and (
         explained > MOSTLY * told or like(h.fit, unknown, raw, explained / told))))

@@ -18,6 +18,7 @@ FOREIGN = 0.5  # of the shape of generic terms: an effect to which less of it be
 OF_PATH = {"_gearing": ("1", "position", "position*position*position"), "_lag": ("acceleration", "inertia"),
            "_offset": ("1", "airspeed", "alpha", "p", "beta")}  # generic terms that are the like of each of its numbers
 MOSTLY, SHAPE = 0.6, 0.8  # of what generic terms explain, of their shape: an effect that is more of it is what they are
+POWERED = 0.98  # of what terms that go with power explain: an effect on the airframe that is less is not what they are
 FORMED = 0.9  # of what they explain, its own form allowed: an effect that is so much of it may be foreign to their kind
 SOME = 0.2  # of what they explain: an effect that is less of it is not what they are for their shape (assumed)
 PURE = 0.4  # of what they explain, as much where they are functions of its own regressors and of nothing else (assumed)
