@@ -55,20 +55,24 @@ def second_order(flights: Sequence[Reconstruction], rows: Sequence[NDArray], sur
         return None
 
     def left(tried: FloatArray) -> FloatArray:
-        within = np.clip(tried, (FREQUENCIES[0], DAMPINGS[0]), (FREQUENCIES[1], DAMPINGS[1]))
-        return squares_left([(f, follow(f, surface, row, within)) for f, row in there], surface, first)
+        return squares_left([(f, follow(f, surface, row, within(tried))) for f, row in there], surface, first)
 
     frequency, damping = (np.geomspace(*FREQUENCIES, TRIED[0]), np.linspace(*DAMPINGS, TRIED[1]))
     tried = np.array([(w, z) for w in frequency for z in damping])
     near = tried[int(np.argmin(left(tried)))]
     scale = np.array([near[0], 1.0])
-    best = minimize(lambda x: float(left(x[None] * scale)[0]), near / scale, method="Nelder-Mead",
-                    options={"xatol": FINE, "fatol": 0.01}).x * scale  # fmt: skip
+    best = within(scale * minimize(lambda x: float(left(x[None] * scale)[0]), near / scale, method="Nelder-Mead",
+                                   options={"xatol": FINE, "fatol": 0.01}).x)  # fmt: skip
     moved = best + 0.05 * np.array([[0.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     here, more, less = left(moved)
     gain = float(squares_left([(f, answered(f, surface, row)) for f, row in there], surface, first)[0] - here)
     error = np.sqrt(2.0 / max((more + less - 2.0 * here) / 0.05**2, 1e-9))
     return SecondOrder(float(best[0]), float(best[1]), float(error), gain) if gain > 0.0 else None
+
+
+def within(tried: FloatArray) -> FloatArray:
+    """Frequencies and dampings [..., 2] that are looked for."""
+    return np.clip(tried, (FREQUENCIES[0], DAMPINGS[0]), (FREQUENCIES[1], DAMPINGS[1]))
 
 
 def follow(flight: Reconstruction, surface: str, row: NDArray, tried: FloatArray) -> FloatArray:

@@ -46,9 +46,10 @@ class Settled:
 class Hypothesis:
     """One explanation: a set of effects (empty: none) and perhaps something unknown beside it.
 
-    `form`: of its effects, where that may be another than the library's; `instead`: generic terms at home that say it
-    better than the library's; `regained`: log evidence gained by these, and by what is forgiven (see `posterior.form`);
-    `settled`: where it was flown; `varies`: whether its effect's size differs along the records (`fit` has the mean).
+    `form`: of its effects, where that may be another than the library's; `instead`: what says it better than that,
+    generic terms at home or its actuators in their usual forms; `regained`: log evidence gained by these, and by what
+    is forgiven (see `posterior.form`); `settled`: where it was flown; `varies`: whether its effect's size differs along
+    the records (`fit` has the mean).
     """
 
     fit: SetFit
