@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from icing_env import effects, scenario
 from icing_env.record import FlightRecord
-from sim2real.actuators.lateness import late_square, lateness
+from sim2real.actuators.lateness import late_squares, lateness
 from sim2real.actuators.paths import follow
 from sim2real.diagnosis import diagnose
 from sim2real.posterior.any_delay import late_fits
@@ -88,7 +88,7 @@ def test_a_low_pass_that_gives_way_makes_no_delay_of_what_is_smoothed():
     smooth = follow(command, first, slow, "elevator", flight.dt)[:, 0]
     late = np.concatenate([np.repeat(smooth[:1], 2), smooth[:-2]])
     flight = replace(flight, positions=flight.positions | {"elevator": late})
-    assert late_square([(flight, slow)], "elevator", 0.04) < 1.0  # so smoothed, it is late and no more
+    assert late_squares([(flight, slow)], "elevator", np.array([0.04]))[0] < 1.0  # so smoothed, it is late and no more
     found = lateness([flight], [slow])
     assert found["elevator_path"].left > FORGIVEN**2
     assert late_fits(found, 0.0, 1.0) == []

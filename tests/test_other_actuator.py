@@ -103,7 +103,7 @@ def test_a_pair_keeps_what_other_terms_of_the_second_regain():
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "size"), [("rudder_lag", 0.1), ("aileron_lag", 0.086), ("aileron_gearing", -0.21)])
 def test_an_actuator_in_another_form_is_told_as_what_it_is(name: str, size: float, tmp_path: Path):
-    """The lags were something unknown on their paths, a gear whose cube undoes its line too."""
+    """The lags were something unknown on their paths."""
     aircraft = Aircraft(parts=((name, "other", size),))
     best = diagnose(in_still_air(tmp_path, "diagnose", aircraft, 12)).hypotheses[0]
     assert (best["effects"], best["unknown"]) == ([name], False)

@@ -63,22 +63,23 @@ Square = Callable[[FloatArray], FloatArray]  # whitened squares left with some d
 
 
 def _square(surface: str, first: int, there: Sequence[tuple[Reconstruction, NDArray]]) -> Square:
-    return lambda delays: np.array([late_square(there, surface, float(delay), first) for delay in delays])
+    return lambda delays: late_squares(there, surface, delays, first)
 
 
-def late_square(there: Sequence[tuple[Reconstruction, NDArray]], surface: str, delay: float, first: int = 0) -> float:
-    """Whitened square that a path leaves if it answers as its rows have it, but for a delay [s], rigged as is likely.
+def late_squares(there: Sequence[tuple[Reconstruction, NDArray]], surface: str, delays: FloatArray, first: int = 0
+                 ) -> FloatArray:  # fmt: skip
+    """Whitened squares that a path leaves if it answers as its rows have it, but for delays [s], rigged as is likely.
 
     Args:
         there: of `moving`.
-        first: sample from which it counts.
+        first: sample from which they count.
     """
     answers = []
     for flight, row in there:
-        answer = answered(flight, surface, row)
+        answer = answered(flight, surface, row)[:, 0]
         time = flight.dt * np.arange(len(answer))
-        answers.append((flight, np.interp(time - delay, time, answer[:, 0])[:, None]))
-    return float(squares_left(answers, surface, first)[0])
+        answers.append((flight, np.column_stack([np.interp(time - delay, time, answer) for delay in delays])))
+    return squares_left(answers, surface, first)
 
 
 def _best(moved: Square, noise: float) -> Late | None:
