@@ -44,11 +44,11 @@ def credible(probabilities: Sequence[float], level: float = 0.95) -> list[int]:
 
 
 def describe(name: str, posterior: Posterior, explained: Hypothesis | None = None,
-             form: Description | None = None, course: History = SAME) -> dict[str, Any]:
+             forms: Sequence[Description] = (), course: History = SAME) -> dict[str, Any]:
     """One effect's entry: its size as in the most probable set that holds it.
 
     Args:
-        explained, form: the explanation that the verdict rests on, and terms by which it is not the library's.
+        explained, forms: the explanation that the verdict rests on, and terms by which it is not the library's.
         course: how its size went along the records.
     """
     fit = posterior.leading(name)
@@ -57,11 +57,11 @@ def describe(name: str, posterior: Posterior, explained: Hypothesis | None = Non
     shown = {p.name: {"estimate": p.neutral, "low95": p.neutral, "high95": p.neutral, "unit": p.unit}
              for p in effect.parameters}
     low, high = interval(fit.estimate[at], fit.low95[at], fit.high95[at], parameter.low, parameter.high)
+    own = [form for form in forms if explained and name in explained.effects and at_home(form.component, (name,))]
     shown[parameter.name] = {"estimate": fit.estimate[at], "low95": low, "high95": high, "unit": parameter.unit}
     return {"name": name, "probability": posterior.effects[name], "enters_at": list(effect.enters_at),
             "parameters": shown, "indistinguishable_from": list(posterior.classes[name]), **course.answer(),
-            "other_form": form.answer() if form and explained and name in explained.effects
-                          and at_home(form.component, (name,)) else None}  # fmt: skip
+            "other_form": own[0].answer() if own else None}
 
 
 def detection_limits(fits: Mapping[str, EffectFit], shown: Mapping[str, float | None]) -> dict[str, dict[str, Any]]:

@@ -12,6 +12,7 @@ from sim2real.closing.discrepancy import Description, describe_unknown, describe
 from sim2real.closing.own_numbers import of_component, with_own_numbers
 from sim2real.closing.parts import Flown, flown_parts
 from sim2real.closing.remedy import Remedy, leading, remedy
+from sim2real.closing.servos import servos
 from sim2real.closing.whole_model import WholeModel
 from sim2real.library.candidates import Bank
 from sim2real.posterior.hypotheses import Hypothesis, Posterior
@@ -32,11 +33,18 @@ class Told:
         explained: it; None for no gap.
         unknown: what the library lacks, likely or not; None where that is improbable.
         form: how the effects differ from the library's; None where they do not.
+        servos: frequency and damping of actuators that are not of first order.
     """
 
     explained: Hypothesis | None
     unknown: Description | None
     form: Description | None
+    servos: tuple[Description, ...] = ()
+
+    @property
+    def forms(self) -> tuple[Description, ...]:
+        """In which its effects are not the library's, what says most by fewest numbers first."""
+        return self.servos if self.form is None else (*self.servos, self.form)
 
     @property
     def flown(self) -> Description | None:
@@ -125,7 +133,7 @@ def _told(flights: Sequence[Reconstruction], candidates: Bank, evidences: Sequen
     if explained is not None and (own := in_other_form(explained)) is not None:
         progress("describing the form of what was found")
         form = describe_unknown(flights, candidates, evidences, baseline, posterior.tempering, own)
-    return Told(explained, unknown, form)
+    return Told(explained, unknown, form, () if explained is None else servos(explained))
 
 
 def flown_freely(flights: Sequence[Reconstruction], gusts: Sequence[Gusts], change: Remedy, seed: int) -> gap.Energy:

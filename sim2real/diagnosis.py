@@ -126,7 +126,7 @@ def diagnose(records: Sequence[FlightRecord], held_out: Sequence[FlightRecord] =
         credible_set_95=credible([h["probability"] for h in hypotheses]),
         where={"channels": gap.by_channel(flown.training.before), "components": _places(found),
                "regimes": regimes(evidences)},
-        effects=[describe(name, posterior, explained, found.told.form, sizes.get(name, SAME))
+        effects=[describe(name, posterior, explained, found.told.forms, sizes.get(name, SAME))
                  for name, p in ranked(posterior) if p >= LISTED],
         not_testable=[{"effect": name, "why": why} for name, why in sorted(at_hand.untestable.items())],
         detection_limits=detection_limits(posterior.fits, shown),

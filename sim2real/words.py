@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from sim2real.actuators.second_order import DAMPING, FREQUENCY
 from sim2real.diagnosis import Diagnosis
 from sim2real.library.candidates import SPREAD
 from sim2real.library.terms import PURE_DELAY
@@ -92,9 +93,17 @@ def _named(effect: dict[str, Any]) -> str:
                      for k, p in effect["parameters"].items() if p["low95"] != p["high95"])  # fmt: skip
     told, form = effect["indistinguishable_from"], effect["other_form"]
     other = f", which these records cannot tell from {listed(told)}," if told else ""
+    if servo := _servo(form):
+        return f"{effect['name']} ({size}), which is a servo of second order ({servo}){other}"
     terms = ", ".join(t["term"] for t in form["terms"] if t["term"] != "1") if form else ""
     bent = f" in another form than the library's ({form['component']} by {terms or 'a constant'})" if form else ""
     return f"{effect['name']} ({size}{_varying(effect)}){bent}{other}"
+
+
+def _servo(form: Mapping[str, Any] | None) -> str:
+    """Frequency and damping of an actuator of second order; nothing for any other form."""
+    known = {t["term"]: t["coefficient"] for t in form["terms"]} if form else {}
+    return f"{known[FREQUENCY]:.3g} rad/s, damping ratio {known[DAMPING]:.2g}" if DAMPING in known else ""
 
 
 def _varying(effect: dict[str, Any]) -> str:

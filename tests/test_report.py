@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from icing_env.errors import InputError
+from sim2real.actuators.second_order import DAMPING
 from sim2real.where import REGIME_VARIABLES
 from testbed.reports.diagnosis import caption_of_terms, regime_row
 from testbed.reports.page import Report, figure_source, format_cell
@@ -257,9 +258,11 @@ def test_browser_shows_the_report(tmp_path: Path) -> None:
 
 
 def test_a_table_of_terms_says_whether_the_reports_aircraft_has_them():
-    terms = {"component": "elevator_path", "kind": "static"}
+    terms = {"component": "elevator_path", "kind": "static", "terms": []}
     assert "terms of elevator_path (static), told and not flown;" in caption_of_terms(terms, "What is there", False)
     assert "not flown" not in caption_of_terms(terms, "What is there", True)
+    servo = terms | {"terms": [{"term": DAMPING, "coefficient": 0.7, "std_error": 0.01}]}
+    assert "told and not flown;" in caption_of_terms(servo, "What is there", True)
     assert "not flown" not in caption_of_terms(terms | {"places": {}}, "What is there", False)
 
 

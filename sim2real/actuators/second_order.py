@@ -24,6 +24,7 @@ FREQUENCIES, DAMPINGS = (2.0, 60.0), (0.35, 1.5)  # rad/s and 1: what is looked 
 TRIED = (16, 5)  # of these at first
 PARTS = 16  # steps of the actuator in one of the record
 FINE = 1e-3  # of each, to which the best is found
+DAMPING, FREQUENCY = "damping ratio", "natural frequency"  # how these are named among terms, after their surface
 
 
 @dataclass(frozen=True)
@@ -32,13 +33,13 @@ class SecondOrder:
 
     Attributes:
         frequency, damping: rad/s and 1.
-        error: of the damping.
+        errors: standard errors of these two, each with the other as it is.
         gain: whitened square that it takes of what the path leaves as it is.
     """
 
     frequency: float
     damping: float
-    error: float
+    errors: tuple[float, ...]
     gain: float
 
 
@@ -63,11 +64,12 @@ def second_order(flights: Sequence[Reconstruction], rows: Sequence[NDArray], sur
     scale = np.array([near[0], 1.0])
     best = within(scale * minimize(lambda x: float(left(x[None] * scale)[0]), near / scale, method="Nelder-Mead",
                                    options={"xatol": FINE, "fatol": 0.01}).x)  # fmt: skip
-    moved = best + 0.05 * np.array([[0.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-    here, more, less = left(moved)
+    steps = np.array([0.05 * best[0], 0.05])
+    here, *around = left(best + np.vstack([np.zeros(2), np.diag(steps), -np.diag(steps)]))
     gain = float(squares_left([(f, answered(f, surface, row)) for f, row in there], surface, first)[0] - here)
-    error = np.sqrt(2.0 / max((more + less - 2.0 * here) / 0.05**2, 1e-9))
-    return SecondOrder(float(best[0]), float(best[1]), float(error), gain) if gain > 0.0 else None
+    curvature = (np.array(around[:2]) + around[2:] - 2.0 * here) / steps**2
+    errors = tuple(float(e) for e in np.sqrt(2.0 / np.maximum(curvature, 1e-9)))
+    return SecondOrder(float(best[0]), float(best[1]), errors, gain) if gain > 0.0 else None
 
 
 def within(tried: FloatArray) -> FloatArray:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from icing_env import effects
 from icing_env.record import FloatArray
+from sim2real.actuators.second_order import DAMPING
 from sim2real.baseline.references import Baseline
 from sim2real.closing.flyable import Choice, choices, condition, flyable
 from sim2real.flown.settling import nearer
@@ -42,7 +43,7 @@ ROUNDS, SETTLED = 12, 0.5  # of fitting at most, each flying the aircraft descri
 AT_FIRST, STANDS_OUT, LEAST = 0.1, 20.0, 1e-3
 MORE = 3  # terms beside those of the round before: what a large gap is not linear in would be told as more of them
 RIDGE = 0.1  # prior precision of a term in its own unit (assumed: a standard deviation of three)
-LATE = ("_dot", "acceleration", PURE_DELAY, "slow_phi", "slow_theta", "slow_ax", "slow_ay")  # terms with a memory
+LATE = ("_dot", "acceleration", PURE_DELAY, DAMPING, "slow_phi", "slow_theta", "slow_ax", "slow_ay")  # with a memory
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from icing_env.record import FloatArray
-from sim2real.actuators.second_order import DAMPINGS, SecondOrder, second_order
+from sim2real.actuators.second_order import DAMPING, DAMPINGS, FREQUENCY, SecondOrder, second_order
 from sim2real.flown.points import Flying, rows_of
 from sim2real.flown.steps import Point
 from sim2real.library.bends import bends
@@ -20,8 +20,6 @@ from sim2real.posterior.generic import UnknownFit, fit_some_left
 from sim2real.posterior.sets import SetFit
 from sim2real.records.channels import SURFACES
 from sim2real.signatures.whitening import SETTLE
-
-SECOND_ORDER = "second order"
 
 
 def other_actuator(flying: Flying, fit: SetFit, point: Point, left: FloatArray) -> UnknownFit | None:
@@ -57,9 +55,11 @@ def _lags(flying: Flying, fit: SetFit, point: Point) -> list[UnknownFit]:
 
 def _told(surface: str, actuator: SecondOrder, tempering: float) -> UnknownFit:
     gain = actuator.gain / tempering
-    width = np.sqrt(2.0 * np.pi * tempering) * actuator.error / (DAMPINGS[1] - DAMPINGS[0])
-    term = (SECOND_ORDER, actuator.frequency, actuator.error)
-    return UnknownFit(f"{surface}_path", 0.5 * gain + float(np.log(min(width, 1.0))), (term,), -gain, {})
+    error, broad = actuator.errors, float(np.sqrt(tempering))
+    width = np.sqrt(2.0 * np.pi) * broad * error[1] / (DAMPINGS[1] - DAMPINGS[0])
+    terms = ((f"{surface} {DAMPING}", actuator.damping, broad * error[1]),
+             (f"{surface} {FREQUENCY}", actuator.frequency, broad * error[0]))  # fmt: skip
+    return UnknownFit(f"{surface}_path", 0.5 * gain + float(np.log(min(width, 1.0))), terms, -gain, {})
 
 
 def _gears(flying: Flying, fit: SetFit, left: FloatArray) -> list[UnknownFit]:

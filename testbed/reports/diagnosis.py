@@ -12,6 +12,7 @@ import numpy as np
 from icing_env.effects.derivatives import OFFSETS
 from icing_env.record import FloatArray
 from sim2real.actuators.paths import driven
+from sim2real.actuators.second_order import DAMPING
 from sim2real.closing import gap
 from sim2real.diagnosis import Diagnosis
 from sim2real.prediction.gusts import KINDS
@@ -115,7 +116,8 @@ def caption_of_terms(described: Mapping[str, Any], what: str, flown: bool) -> st
     """
     every = "places" in described  # all numbers of the model, which fly as such
     at = "changes of the model's numbers" if every else f"terms of {described['component']}"
-    told = "" if flown or every else ", told and not flown"
+    servo = any(t["term"] == DAMPING for t in described["terms"])  # the simulator's actuators are of first order
+    told = "" if every or (flown and not servo) else ", told and not flown"
     return f"{what}, as {at} ({described['kind']}){told}; coefficients in SI units, angles in rad, delays in s."
 
 
