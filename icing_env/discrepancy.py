@@ -59,6 +59,8 @@ DISCREPANCY_PARAMETERS: list[Field] = [
     ("Cl_phi", "1", "Cl per sin(phi) cos(theta)"),
     ("Cm_theta", "1", "Cm per sin(theta)"),
     *((f"{c}_time", "1/s", f"growth of {c} since the start") for c in AXES),
+    ("CD_alpha2", "1/rad2", "drag along the air stream per square of sin(alpha)"),
+    ("density_lapse", "1/m", "growth of the density factor with altitude"),
     *PATH_PARAMETERS,
 ]
 

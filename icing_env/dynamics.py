@@ -64,20 +64,20 @@ def meet_air(x: Any, attitude: tuple, s: Any, c: Any, p: Any) -> tuple:
     kelvin, static, holds = static_air_near(x.altitude, c.standard_pressure, c.per_standard_temperature)
     if not holds:
         kelvin, static = static_air(x.altitude)
-    return (air_density(kelvin, static, p), static, *air_data(x, attitude, s, p))
+    return (air_density(kelvin, static, x.altitude, p), static, *air_data(x, attitude, s, p))
 
 
 @kernel
 def meet_air_near(x: Any, attitude: tuple, s: Any, c: Any, p: Any) -> tuple:
     """`meet_air` by the series alone, and whether that holds: straight-line code, for aircraft side by side."""
     kelvin, static, holds = static_air_near(x.altitude, c.standard_pressure, c.per_standard_temperature)
-    return (air_density(kelvin, static, p), static, *air_data(x, attitude, s, p)), holds
+    return (air_density(kelvin, static, x.altitude, p), static, *air_data(x, attitude, s, p)), holds
 
 
 @kernel
-def air_density(kelvin: float, static: float, p: Any) -> float:
-    """Density [kg/m3] of air of a standard temperature [K] at a static pressure [Pa]."""
-    return p.density_factor*static/(GAS_CONSTANT*(kelvin + p.temperature_offset))
+def air_density(kelvin: float, static: float, altitude: float, p: Any) -> float:
+    """Density [kg/m3] of air of a standard temperature [K] at a static pressure [Pa] and an altitude [m]."""
+    return (p.density_factor + p.density_lapse*altitude)*static/(GAS_CONSTANT*(kelvin + p.temperature_offset))
 
 
 @kernel
@@ -123,7 +123,7 @@ def loads(x: Any, air: tuple, s: Any, c: Any, p: Any) -> tuple:
     cm -= tail*p.Cm_alpha_tail*(alpha_tail + c.alpha_tail_stall)
     cl += 0.5*p.lift_arm*(lift_right - lift_left)
     cn -= 0.5*p.lift_arm*(axial_right - axial_left)
-    bluff = 0.5*density*airspeed*p.wing_area*c.CD_parasite
+    bluff = 0.5*density*airspeed*p.wing_area*(c.CD_parasite + p.CD_alpha2*sine*sine)
     more_x, more_y, more_z, more_l, more_m, more_n = discrepancy(
         alpha, beta, (phat, qhat, rhat), airspeed, ct, qs*cy - bluff*va, slowness, x, c, p)
 

@@ -54,7 +54,7 @@ DUE = np.bool_(True)  # for a plain True numba would compile the instruments onc
 def advance_weather_and_ice(s: Any, p: Any, airspeed: float, dt: float) -> None:
     """The slow clock: cloud along the track and ice on every surface."""
     advance_cloud(s, p, airspeed, dt)
-    density = p.density_factor*pressure(s.altitude)/(GAS_CONSTANT*s.temperature)
+    density = (p.density_factor + p.density_lapse*s.altitude)*pressure(s.altitude)/(GAS_CONSTANT*s.temperature)
     advance_accretion(s, p, airspeed, density, dt)
 
 

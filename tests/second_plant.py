@@ -46,7 +46,7 @@ def read(folder: str, name: str) -> dict[str, float]:
 
 def parameters(**files: str) -> dict[str, float]:
     """The union of one file from each folder (`aircraft="twin_otter_flight"` and so on)."""
-    numbers = dict.fromkeys(NAMES, 0.0)
+    numbers = dict.fromkeys((*NAMES, "CD_alpha2", "density_lapse"), 0.0)
     for folder, name in (FILES | files).items():
         numbers |= read(folder, name)
     return numbers
@@ -100,7 +100,7 @@ def atmosphere(altitude: Any, p: Record) -> tuple[Any, Any, Any]:
     low = h <= H11
     temperature = np.where(low, T0 - LAPSE * h, T11)
     pressure = np.where(low, P0 * (temperature / T0) ** POWER, P11 * np.exp(-G0 * (h - H11) / (R * T11)))
-    density = p.density_factor * pressure / (R * (temperature + p.temperature_offset))
+    density = (p.density_factor + p.density_lapse * altitude) * pressure / (R * (temperature + p.temperature_offset))
     return pressure, density, p.gravity_sea_level * (p.earth_radius / (p.earth_radius + altitude)) ** 2
 
 
@@ -206,7 +206,8 @@ def loads(x: Record, a: Record, f: Record, t: Record, c: Record, p: Record) -> t
     h = half_wings(a, f, c)
     CX, CZ, Cm = longitudinal(x, a, f, h, t.ct, c, p)
     CY, Cl, Cn = lateral(x, a, f, h, c, p)
-    qS, bluff = a.qbar * p.wing_area, a.density * a.V * p.wing_area * c.CD_parasite / 2
+    drag = c.CD_parasite + p.CD_alpha2 * np.sin(a.alpha) ** 2
+    qS, bluff = a.qbar * p.wing_area, a.density * a.V * p.wing_area * drag / 2
     more = discrepancy(x, a, t.ct, qS * CY - bluff * a.va, c, p)
     CX, CY, CZ, Cl, Cm, Cn = (C + more[n] for n, C in zip(more, (CX, CY, CZ, Cl, Cm, Cn), strict=True))
     Fx, Fy, Fz = qS * CX - bluff * a.ua + t.both, qS * CY - bluff * a.va, qS * CZ - bluff * a.wa

@@ -25,7 +25,8 @@ SIGNED = {"_cube": 3.0, "_side": 0.02, "_magnitude": 0.2, "_direction": 0.03, "_
           "ground_altitude": 1000.0, "CD_parasite": 0.03, "wind_reference_altitude": 2000.0,
           "CX_elevator": 0.2, "_airspeed": 1e-3, "_airspeed2": 1e-5, "CZ_alpha2": 2.0, "Cm_alpha2": 2.0,
           "_alpha_elevator": 2.0, "Cm_elevator2": 2.0, "_alpha_beta": 0.3, "alpha3": 5.0, "elevator3": 5.0, "q3": 300.0,
-          "beta3": 1.0, "_p3": 3.0, "_r3": 3.0, "aileron3": 0.5, "rudder3": 0.5, "_time": 1e-3}  # fmt: skip
+          "beta3": 1.0, "_p3": 3.0, "_r3": 3.0, "aileron3": 0.5, "rudder3": 0.5, "_time": 1e-3,
+          "_lapse": 1e-5, "CD_alpha2": 2.0}  # fmt: skip
 GUSTS = {"gust_u": 8.0, "gust_v": 8.0, "gust_w": 8.0, "gust_w_tail": 8.0, "gust_p": 0.3, "gust_q": 0.3, "gust_r": 0.3}
 # Sizes that errors of a flight are measured by: distance flown, 50 m/s, 1, 0.5 rad/s, travel of each surface, 200 kW.
 SCALES = np.array([4e3] * 3 + [50.0] * 3 + [1.0] * 4 + [0.5] * 3 + [0.698, 0.58, 0.56, 0.654] + [2e5] * 2 + [0.2])
@@ -38,7 +39,8 @@ def columns(array: NDArray) -> Record:
 def altered(aircraft: str, n: int, rng: np.random.Generator) -> dict[str, NDArray]:
     """Every number that the rates may use, changed by a fifth; what is zero by a size of its own (last match)."""
     numbers = second_plant.parameters(aircraft=aircraft)
-    used = [*second_plant.read("aircraft", aircraft), *NAMES, "ice_factor_floor", "temperature_offset",
+    used = [*second_plant.read("aircraft", aircraft), *NAMES, "CD_alpha2", "density_lapse",
+            "ice_factor_floor", "temperature_offset",
             *(name for name in numbers if name.startswith(("wind_", "k_")))]  # fmt: skip
     values = {}
     for name in used:

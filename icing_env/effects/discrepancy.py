@@ -34,7 +34,7 @@ TERMS: dict[str, tuple[str, ...]] = {
     "Cn": (*SIDEWAYS, "r_r_r", "rudder_rudder_rudder", "alpha_aileron", "alpha_rudder", "rudder_airspeed", "alpha_CT"),
 }
 AT = {"alpha": "rad", "elevator": "rad", "airspeed": "m/s", "time": "s", "phi": "rad", "theta": "rad", "ax": "m/s2",
-      "ay": "m/s2", "az": "m/s2", "altitude": "m", "CT": "1"}  # fmt: skip
+      "ay": "m/s2", "az": "m/s2", "altitude": "m", "CT": "1", "height": "m"}  # fmt: skip
 CHANNELS = DRIFTING  # those of which an error can be described: airspeed to altitude
 # Numbers of each surface's path: gearing and offset by which it differs, a lag more, and how it bends.
 PATHS = {s: (f"{s}_gearing", f"{s}_offset", f"{s}_lag", *bends(s)) for s in SURFACES}
@@ -57,6 +57,8 @@ def apply(p: NDArray, values: Values) -> None:
             _read(p, channel, of, values)
     for surface in SURFACES:
         _bend(p, surface, values)
+    p["density_factor"] -= values["density_height"]*values["at_height"]
+    p["density_lapse"] += values["density_height"]
     for channel in DELAYED:
         p[f"delay_{channel}"] += values[f"delay_{channel}"]
     p["pitot_lag"] = np.maximum(p["pitot_lag"] + values["delay_airspeed"], 0.0)
@@ -126,7 +128,7 @@ EFFECT = Effect(
     name="discrepancy",
     component="aerodynamics",
     enters_at=("x_force", "y_force", "z_force", "rolling_moment", "pitching_moment", "yawing_moment",
-               *(f"sensor:{channel}" for channel in CHANNELS), *(f"{surface}_path" for surface in SURFACES)),
+               *(f"sensor:{channel}" for channel in CHANNELS), *(f"{surface}_path" for surface in SURFACES), "wind"),
     description="Terms of force and moment coefficients and errors of channels, as a diagnosis describes an unknown",
     source="docs/model.md, section 20",
     parameters=(
@@ -138,6 +140,7 @@ EFFECT = Effect(
         *(_number(name, unit) for name, unit, _ in CROSSTALK_PARAMETERS),
         *(_number(f"{s}_{name}", unit) for s in SURFACES for name, unit in PATH_UNITS.items()),
         *(_number(name, unit) for name, unit, _ in PATH_PARAMETERS),
+        _number("density_height", "1/m"),
         *(Parameter(f"at_{name}", u, neutral=0.0, typical=0.0, low=-1e5, high=1e5) for name, u in AT.items()),
     ),
     apply=apply,
