@@ -24,7 +24,7 @@ from sim2real.closing.remedy import Remedy, remedy, resimulation, values_of
 from sim2real.closing.whole_model import components_with
 from sim2real.ladder import ladder
 from sim2real.library.candidates import SPREAD, Bank, bank, not_testable, of_model
-from sim2real.library.terms import in_common
+from sim2real.library.pushes import in_common
 from sim2real.over_time.history import SAME, History, histories
 from sim2real.planning.limits import limits
 from sim2real.planning.manoeuvre import next_manoeuvre

@@ -9,7 +9,7 @@ import pytest
 
 from icing_env import scenario
 from sim2real.library.candidates import bank
-from sim2real.library.terms import pushes
+from sim2real.library.pushes import pushes
 from sim2real.prediction.along import REST
 from sim2real.prediction.correction import STATES
 from sim2real.prediction.gusts import Kind
@@ -56,7 +56,7 @@ def test_free_flight_is_the_simulators(flight: Reconstruction, rows: int) -> Non
 def test_a_row_flies_alone_as_in_a_batch(flight: Reconstruction) -> None:
     """To the bit, with feedback and with pushes."""
     from sim2real.library.candidates import bank, parameter_rows
-    from sim2real.library.terms import pushes
+    from sim2real.library.pushes import pushes
     from sim2real.prediction.kalman import gains
     from sim2real.prediction.predictor import innovations
 

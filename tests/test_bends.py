@@ -8,9 +8,10 @@ import pytest
 from icing_env import effects, scenario
 from icing_env.effects.derivatives import OFFSETS
 from icing_env.types import DERIVATIVE_NAMES
-from sim2real.library.bends import THRUST, bends, changes, natural
+from sim2real.library.bends import DRAG, GROWS, THRUST, bends, changes, natural
 from sim2real.library.candidates import bank
-from sim2real.library.terms import BEYOND, GENERIC, WANDERING, Term, pushes
+from sim2real.library.pushes import pushes
+from sim2real.library.terms import BEYOND, GENERIC, WANDERING, Term
 from sim2real.library.units import unit_of
 from sim2real.records.channels import TOLERANCE
 from sim2real.records.reconstruct import Reconstruction, reconstruct
@@ -26,7 +27,7 @@ def test_an_effect_bends_with_the_regressors_of_the_derivatives_that_it_changes(
     assert not bends(effects.get("mass_error")) and not bends(effects.get("lateral_cg"))
     for effect in effects.LIBRARY.values():
         assert changes(effect), effect.name
-        own = changes(effect) & {*DERIVATIVE_NAMES, "scale_alpha", "scale_airspeed", *OFFSETS, *THRUST}
+        own = changes(effect) & {*DERIVATIVE_NAMES, "scale_alpha", "scale_airspeed", *OFFSETS, *THRUST, *GROWS, *DRAG}
         assert bool(bends(effect)) <= bool(own), effect.name
 
 

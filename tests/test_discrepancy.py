@@ -19,7 +19,8 @@ from icing_env.trim import trim
 from sim2real.actuators.paths import answered, follow
 from sim2real.closing.flyable import SQUARE, choices, condition
 from sim2real.library.candidates import bank
-from sim2real.library.terms import GENERIC, pushes
+from sim2real.library.pushes import pushes
+from sim2real.library.terms import GENERIC
 from sim2real.prediction.as_predicted import predicted
 from sim2real.prediction.kalman import gains
 from sim2real.prediction.predictor import innovations

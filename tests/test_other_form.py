@@ -19,7 +19,8 @@ from sim2real.flown.points import Flying
 from sim2real.flown.steps import FARTHEST, bounded_step
 from sim2real.library import candidates as library
 from sim2real.library.candidates import bank
-from sim2real.library.terms import GENERIC_SIZE, Term, in_common, pushes, values_of
+from sim2real.library.pushes import in_common, pushes, values_of
+from sim2real.library.terms import GENERIC_SIZE, Term
 from sim2real.posterior.form import Form, home
 from sim2real.posterior.generic import fit_unknown
 from sim2real.posterior.home_terms import gain

@@ -17,8 +17,8 @@ from sim2real.flown.corrections import corrected, lost
 from sim2real.flown.points import Flying
 from sim2real.flown.steps import Point, bounded_step, rooms
 from sim2real.library.candidates import NUISANCE_STEP, bank
+from sim2real.library.pushes import in_common, pushes
 from sim2real.library.sizes import size_prior
-from sim2real.library.terms import in_common, pushes
 from sim2real.posterior.hypotheses import Hypothesis
 from sim2real.posterior.sets import SetFit
 from sim2real.records.reconstruct import reconstruct

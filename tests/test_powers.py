@@ -13,7 +13,7 @@ from icing_env.errors import InputError
 from icing_env.record import FlightRecord
 from sim2real.diagnosis import diagnose
 from sim2real.library.candidates import bank, not_testable
-from sim2real.library.terms import pushes
+from sim2real.library.pushes import pushes
 from sim2real.records.channels import MEASURED
 from sim2real.records.powers import powers, spin_inertia, thrust_per_power
 from sim2real.records.reconstruct import reconstruct

@@ -9,7 +9,7 @@ import pytest
 
 from icing_env import scenario
 from sim2real.library.candidates import bank
-from sim2real.library.terms import at_any_time, pushes
+from sim2real.library.pushes import at_any_time, pushes
 from sim2real.prediction.gusts import KINDS, LATER
 from sim2real.prediction.kalman import follow
 from sim2real.prediction.predictor import Push

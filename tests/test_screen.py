@@ -17,7 +17,7 @@ from sim2real.flown.points import Flying
 from sim2real.flown.steps import Places, Point
 from sim2real.flown.valleys import lowest
 from sim2real.library.candidates import Family, bank, nodes
-from sim2real.library.terms import in_common
+from sim2real.library.pushes import in_common
 from sim2real.posterior.sets import SetFit
 from sim2real.prediction.predictor import LOST, with_spare
 from sim2real.records.reconstruct import Reconstruction, reconstruct

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from icing_env import scenario
 from icing_env.record import FlightRecord
 from sim2real.diagnosis import diagnose
-from sim2real.library.terms import WIND_SIZE, Term, pushes
+from sim2real.library.pushes import pushes
+from sim2real.library.terms import WIND_SIZE, Term
 from sim2real.posterior.any_course import PLACES
 from sim2real.posterior.generic import COURSE
 from sim2real.prediction.predictor import Predictor

@@ -21,7 +21,8 @@ from icing_env.discrepancy import bends, bent
 from icing_env.jit import entry
 from icing_env.propulsion import power_available
 from icing_env.record import FloatArray
-from sim2real.library.terms import Term, path_courses, values_of
+from sim2real.library.pushes import path_courses, values_of
+from sim2real.library.terms import Term
 from sim2real.records.channels import SURFACES
 from sim2real.records.instruments import UNFILTERED
 from sim2real.records.noise import white

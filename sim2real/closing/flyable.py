@@ -10,7 +10,8 @@ import numpy as np
 from icing_env.crosstalk import CROSSTALK
 from icing_env.effects.discrepancy import AT
 from sim2real.library.bends import COMPONENTS
-from sim2real.library.terms import DEVIATION, FROM_ZERO, GENERIC, GENERIC_SIZE, regressor, values_of
+from sim2real.library.pushes import values_of
+from sim2real.library.terms import DEVIATION, FROM_ZERO, GENERIC, GENERIC_SIZE, WIND, regressor
 from sim2real.library.units import unit_of
 from sim2real.records.channels import TOLERANCE
 from sim2real.records.reconstruct import Reconstruction
@@ -19,7 +20,7 @@ SCALE, DELAY = 0.1, 0.1  # unit of a channel's scale error, and s of its delay
 SQUARE = 0.1  # of a reading, in the unit of the search: what it says is fed back, and by a whole one runs away
 CUBE = 5.0  # 1/rad2: a tenth of a position of 0.14 rad
 COEFFICIENT = {component: coefficient for coefficient, component in COMPONENTS.items()}
-ABOUT = ("alpha", "elevator", "airspeed", "theta", "CT")  # whose deviations from the records' medians are terms
+ABOUT = ("alpha", "elevator", "airspeed", "theta", "CT", "height")  # whose deviations from medians are terms
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ def choices(component: str, flights: Sequence[Reconstruction]) -> list[Choice]:
     names = flyable(component, flights)
     if component.endswith("_path"):
         return [_of_path(component, name) for name in names]
+    if component == WIND:
+        return [Choice(name, f"density_{name}", unit_of(name, component)) for name in names]
     half = 0.5 * _mean([f.time[-1] for f in flights])
     if component.startswith("sensor:"):
         channel = component.removeprefix("sensor:")

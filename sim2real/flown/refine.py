@@ -19,10 +19,10 @@ from sim2real.flown.beside_unknown import accompanied
 from sim2real.flown.companions import companions, leading, together, told_by_paths, without
 from sim2real.flown.corrections import corrected, inherited, lost
 from sim2real.flown.liberty import AtLiberty
-from sim2real.flown.other_actuator import other_actuator
 from sim2real.flown.other_form import Bent, flown_unknown, other_form
 from sim2real.flown.points import Flying
 from sim2real.flown.steps import Places, Point
+from sim2real.flown.usual_form import usual_form
 from sim2real.posterior.any_course import beside, wander_fits, with_courses
 from sim2real.posterior.any_delay import late_fits
 from sim2real.posterior.forgiveness import forgive
@@ -129,7 +129,7 @@ class _Search:
                                               *wander_fits(self.left[i].wander, *path),
                                               *late_fits(self.left[i].late, *path)])
         if h.effects:
-            instead = other_actuator(self.flying, h.fit, self.points[i], left)
+            instead = usual_form(self.flying, h.fit, self.points[i], left)
             self.found[i] = replace(h, form=self._form(i, h), instead=instead)
         else:
             self.nothing, self.own_numbers = h.fit.misfit, self.left[i].unbounded()

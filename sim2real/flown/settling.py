@@ -15,7 +15,7 @@ from sim2real.baseline.inadequacy import WALKS
 from sim2real.baseline.references import Baseline
 from sim2real.flown.points import Flying
 from sim2real.library.candidates import NUISANCE_STEP, Bank, shifted
-from sim2real.library.terms import pushes
+from sim2real.library.pushes import pushes
 from sim2real.posterior.attribution import nuisance_mean, reduce, with_prior
 from sim2real.posterior.hypotheses import Hypothesis
 from sim2real.prediction.as_predicted import as_predicted

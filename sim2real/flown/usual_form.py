@@ -1,8 +1,9 @@
-"""What faults of an actuator mostly are where they are not as the library has them: explicit, and weighed as that.
+"""What faults mostly are where they are not as the library has them: explicit, and weighed as that.
 
-A lag of second order instead of first, a gear that bends instead of one that is a line. Whatever generic terms at home
-could do is forgiven by as much as the library's own form explains, which of a gear whose cube undoes its line, or of a
-servo that overshoots, is little.
+A lag of second order instead of first, a gear that bends instead of one that is a line; air that is denser with height
+or rises unevenly, where the library has a constant; drag that is there and grows, where it has one at a time. Whatever
+generic terms at home could do is forgiven by as much as the library's own form explains, which of a gear whose cube
+undoes its line, or of a servo that overshoots, is little.
 """
 
 from __future__ import annotations
@@ -15,21 +16,21 @@ from icing_env.record import FloatArray
 from sim2real.actuators.second_order import DAMPING, DAMPINGS, FREQUENCY, SecondOrder, second_order
 from sim2real.flown.points import Flying, rows_of
 from sim2real.flown.steps import Point
-from sim2real.library.bends import bends
+from sim2real.library.bends import DRAG, bends, changes, grows
 from sim2real.posterior.generic import UnknownFit, fit_some_left
 from sim2real.posterior.sets import SetFit
 from sim2real.records.channels import SURFACES
 from sim2real.signatures.whitening import SETTLE
 
 
-def other_actuator(flying: Flying, fit: SetFit, point: Point, left: FloatArray) -> UnknownFit | None:
-    """A set with its actuators' faults in these forms, where that leaves less; all told, and what is left.
+def usual_form(flying: Flying, fit: SetFit, point: Point, left: FloatArray) -> UnknownFit | None:
+    """A set with its faults in these forms, where that leaves less; all told, and what is left.
 
     Args:
         point: where the set was flown.
         left: of `Remainder.reduced` there.
     """
-    found = [*_lags(flying, fit, point), *_gears(flying, fit, left)]
+    found = [*_lags(flying, fit, point), *_bent(flying, fit, left)]
     if not found:
         return None
     gained, taken = (sum(getattr(u, of) for u in found) for of in ("log_evidence", "misfit"))
@@ -62,9 +63,9 @@ def _told(surface: str, actuator: SecondOrder, tempering: float) -> UnknownFit:
     return UnknownFit(f"{surface}_path", 0.5 * gain + float(np.log(min(width, 1.0))), terms, -gain, {})
 
 
-def _gears(flying: Flying, fit: SetFit, left: FloatArray) -> list[UnknownFit]:
-    """Gears that bend for every gearing whose surface has no lag: evidence and misfit more than the set's."""
-    bent = [bends(family.effect) for family in fit.families if family.effect.name.endswith("_gearing")
-            and family.effect.name.replace("_gearing", "_lag") not in fit.effects]  # fmt: skip
-    found = [fit_some_left(left, flying.candidates, own) for own in bent]
+def _bent(flying: Flying, fit: SetFit, left: FloatArray) -> list[UnknownFit]:
+    """Gears that bend where a surface has no lag, and what grows: evidence and misfit more than the set's."""
+    own = [bends(f.effect) for f in fit.families if grows(f.effect) or changes(f.effect) == DRAG
+           or (f.effect.name.endswith("_gearing") and f.effect.name.replace("_gearing", "_lag") not in fit.effects)]
+    found = [fit_some_left(left, flying.candidates, terms) for terms in own]
     return [replace(u, misfit=u.misfit - float(left[0, 0])) for u in found if u is not None and u.log_evidence > 0.0]

@@ -24,6 +24,14 @@ COMPONENTS = {"CX": "x_force", "CY": "y_force", "CZ": "z_force", "Cl": "rolling_
               "Cn": "yawing_moment"}  # fmt: skip
 
 
+# What grows where the library has a constant: generic terms of the one number that an effect changes. Air is seldom the
+# standard one at every height, and what rises does not rise evenly.
+GROWS = {"density_factor": ("wind", ("height",)),
+         "wind_down": ("sensor:altitude", ("1", "time", *WANDERING))}  # fmt: skip
+
+DRAG = {"CD_parasite", "CD_alpha2"}  # of one effect: one of these is fitted, and drag does not only lie or only grow
+
+
 @cache
 def changes(effect: Effect) -> frozenset[str]:
     """Numbers of the aircraft (of PARAMETERS) that an effect changes."""
@@ -43,6 +51,10 @@ def bends(effect: Effect) -> frozenset[tuple[str, str]]:
         return frozenset({(f"sensor:{channel}", f"{channel}*{channel}")})
     if channel := shifts(effect):
         return frozenset((f"sensor:{channel}", term) for term in ("time", *WANDERING))
+    if terms := grows(effect):
+        return terms
+    if changes(effect) == DRAG:
+        return frozenset(("x_force", term) for term in ("1", "alpha", "alpha*alpha"))
     if surface := _alone(effect, "", "_gearing"):
         return frozenset({(f"{surface}_path", "position"), (f"{surface}_path", "position*position*position")})
     if changes(effect) and changes(effect) <= set(THRUST):
@@ -59,6 +71,13 @@ def _of_thrust(effect: Effect) -> list[str]:
     """Terms of thrust that another form of an effect on it may have."""
     both = ["both*airspeed", "both*airspeed*airspeed"]
     return both if _of_both_engines(effect) else ["both", *both, "left", "left*airspeed", "left*airspeed*airspeed"]
+
+
+@cache
+def grows(effect: Effect) -> frozenset[tuple[str, str]]:
+    """Generic terms (component, name) of an effect that is a constant in the library and seldom one in flight."""
+    component, terms = GROWS.get(_alone(effect, "", ""), ("", ()))
+    return frozenset((component, term) for term in terms)
 
 
 @cache

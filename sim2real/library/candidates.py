@@ -163,11 +163,15 @@ PIECES: dict[tuple[str, str], tuple[tuple[float, ...], ...]] = {
 }
 
 
+# Below these sizes an effect makes what another one does: of drag that grows, lost suction says as much.
+FROM = {("ice_drag", "growth"): 1.0}
+
+
 def _pieces(effect: Effect, parameter: Parameter) -> list[tuple[tuple[float, ...], float, float]]:
     """Nodes and ends of every piece of a parameter's range."""
     parts = PIECES.get((effect.name, parameter.name))
     if parts is None:
-        return [(nodes(parameter), parameter.low, parameter.high)]
+        return [(nodes(parameter), FROM.get((effect.name, parameter.name), parameter.low), parameter.high)]
     ends = [parameter.low, *(part[-1] for part in parts[:-1]), parameter.high]
     return [(part, low, high) for part, low, high in zip(parts, ends, ends[1:], strict=False)]
 

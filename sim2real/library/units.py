@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from sim2real.library.terms import (
+    AIR_SIZE,
     DEVIATION,
     GENERIC,
     GENERIC_SIZE,
@@ -35,6 +36,8 @@ def unit_of(term: str, component: str, reach: Mapping[str, float] | None = None)
 def _unit(term: str, component: str) -> float:
     if component.endswith("_path"):
         return PATH_SIZE[term] if term in PATH_SIZE else PATH_SIZE["1"] / DEVIATION.get(term, 1.0)
+    if component == WIND and term == "height":
+        return AIR_SIZE / DEVIATION[term]
     if component == WIND:
         return WIND_SIZE if term.endswith("time") else WIND_CHANGE
     if component == "propulsion":

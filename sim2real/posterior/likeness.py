@@ -9,7 +9,18 @@ import numpy as np
 from icing_env import effects
 from icing_env.effects import Effect
 from icing_env.record import FloatArray
-from sim2real.library.bends import COMPONENTS, bends, changes, natural, of_own, powerless, purely_own, scales, shifts
+from sim2real.library.bends import (
+    COMPONENTS,
+    bends,
+    changes,
+    grows,
+    natural,
+    of_own,
+    powerless,
+    purely_own,
+    scales,
+    shifts,
+)
 from sim2real.posterior.form import LEAST, SHARES, WORTH, Form, at_home
 from sim2real.posterior.generic import COURSE, UnknownFit
 from sim2real.posterior.sets import SetFit
@@ -72,9 +83,13 @@ def bent_gear(fit: SetFit, unknown: UnknownFit) -> bool:
 def calibration(name: str, unknown: UnknownFit, raw: FloatArray) -> bool:
     """Whether generic terms are mostly a function of the one reading that an effect scales, or an offset of it.
 
-    Whatever the effect itself explains of them: a part of an offset is within what a calibration leaves anyway.
+    Or what an effect mostly does that is a constant in the library. Whatever the effect itself explains of them: a part
+    of an offset is within what a calibration leaves anyway.
     """
     channel = scales(effects.LIBRARY[name]) or shifts(effects.LIBRARY[name])
+    growing = {term for component, term in grows(effects.LIBRARY[name]) if component == unknown.component}
+    if growing:
+        return _share(growing, unknown, raw) > SHAPE
     own = {term for term, _, _ in unknown.terms if natural(effects.LIBRARY[name], unknown.component, term)}
     return bool(channel) and unknown.component == f"sensor:{channel}" and _share(own, unknown, raw) > SHAPE
 

@@ -18,7 +18,8 @@ from sim2real.actuators.lateness import Late
 from sim2real.actuators.paths import PATHS
 from sim2real.actuators.wandering import Wander
 from sim2real.library.knots import knots
-from sim2real.library.terms import WIND, Term, at_any_time, pushes
+from sim2real.library.pushes import at_any_time, pushes
+from sim2real.library.terms import WIND, Term
 from sim2real.prediction.predictor import Push
 from sim2real.records.side_by_side import each
 from sim2real.signatures.evidence import Evidence

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from icing_env.record import FloatArray
 from sim2real.actuators.paths import counted, path_gram, path_residuals
 from sim2real.library.candidates import Bank, parameter_rows
-from sim2real.library.terms import Term, pushes
+from sim2real.library.pushes import pushes
+from sim2real.library.terms import Term
 from sim2real.prediction.as_predicted import as_predicted
 from sim2real.prediction.gusts import Gusts
 from sim2real.prediction.kalman import Gain, follow

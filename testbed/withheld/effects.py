@@ -210,7 +210,9 @@ EFFECTS: tuple[Effect, ...] = (
     Effect("air_density", ("wind",), "change", 0.03, plus("density_factor"), plus("density_lapse")),
 )  # fmt: skip
 # Parameters of the library beside the one that is drawn, so that an answer that uses them can be flown.
-FURTHER = {"inertia_error": {"yy": times("inertia_yy"), "zz": times("inertia_zz")}}
+FURTHER: dict[str, dict[str, Form]] = {
+    "inertia_error": {"yy": times("inertia_yy"), "zz": times("inertia_zz")},
+    "ice_drag": {"growth": lambda s: ({"CD_alpha": 0.06**2 * s}, {})}}
 BY_NAME = {effect.name: effect for effect in EFFECTS} | {
     f"{name}.{parameter}": Effect(f"{name}.{parameter}", (), parameter, 0.0, form, form)
     for name, forms in FURTHER.items() for parameter, form in forms.items()}
