@@ -160,13 +160,18 @@ def _typical(family: Family) -> float:
 
 
 def _first_seen(reduced: FloatArray, families: Sequence[Family]) -> dict[str, _Shown]:
-    """Every effect by the parameter that shows first."""
+    """Every effect by the parameter that shows first, of those with a typical size if any of them shows."""
     out: dict[str, _Shown] = {}
     for family in families:
         found, name = _shown(reduced, family), family.effect.name
-        if name not in out or found.ease < out[name].ease:
+        if name not in out or _rank(found) < _rank(out[name]):
             out[name] = found
     return out
+
+
+def _rank(shown: _Shown) -> tuple[bool, bool, float]:
+    p = shown.family.parameter
+    return shown.smallest is None, p.typical == p.neutral, shown.ease
 
 
 def _shown(reduced: FloatArray, family: Family) -> _Shown:

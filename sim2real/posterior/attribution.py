@@ -29,6 +29,7 @@ from sim2real.posterior.prior import P_NONE, set_prior, single_prior, unknown_pr
 from sim2real.posterior.sets import INTEGRATED, SetFit, firm, grow, integrate, pairs, sizes_tried
 from sim2real.posterior.singles import EffectFit, ambiguity, fit_family
 
+CLEARLY = 3.0  # log evidence by which another parameter than its first is told of an effect (assumed)
 BESIDE, MOST_BESIDE = 6, 2  # leading sets that something unknown is tried beside, and effects they may have
 
 def reduce(gram: FloatArray, bank: Bank, precision: FloatArray | None = None) -> FloatArray:
@@ -153,9 +154,15 @@ def _leading(found: Sequence[Hypothesis]) -> list[Hypothesis]:
 
 
 def _best(own: Sequence[EffectFit]) -> EffectFit:
-    """The likeliest parameter of those that would show, and piece of its range; the smallest size is any piece's."""
+    """The first parameter of those that would show, or one that is far likelier, and piece of its range.
+
+    The smallest size is any piece's.
+    """
     shows = {e.family.parameter.name for e in own if e.smallest is not None}
-    best = max((e for e in own if not shows or e.family.parameter.name in shows), key=lambda e: e.log_evidence)
+    able = [e for e in own if not shows or e.family.parameter.name in shows]
+    likeliest, usual = (max(some, key=lambda e: e.log_evidence) for some in (
+        able, [e for e in able if e.family.parameter is able[0].family.parameter]))
+    best = likeliest if likeliest.log_evidence > usual.log_evidence + CLEARLY else usual
     shown = [e.smallest for e in own if e.smallest is not None and e.family.parameter is best.family.parameter]
     return replace(best, smallest=min(shown, key=lambda s: abs(s - best.family.parameter.neutral), default=None))
 
