@@ -77,7 +77,13 @@ def meet_air_near(x: Any, attitude: tuple, s: Any, c: Any, p: Any) -> tuple:
 @kernel
 def air_density(kelvin: float, static: float, altitude: float, p: Any) -> float:
     """Density [kg/m3] of air of a standard temperature [K] at a static pressure [Pa] and an altitude [m]."""
-    return (p.density_factor + p.density_lapse*altitude)*static/(GAS_CONSTANT*(kelvin + p.temperature_offset))
+    return denser(altitude, p)*static/(GAS_CONSTANT*(kelvin + p.temperature_offset))
+
+
+@kernel
+def denser(altitude: float, p: Any) -> float:
+    """Density over that of pressure and temperature at an altitude [m]."""
+    return p.density_factor + p.density_lapse*altitude
 
 
 @kernel

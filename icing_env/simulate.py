@@ -32,7 +32,7 @@ from icing_env.blocks import (
     rk4_block,
 )
 from icing_env.cloud import advance_cloud
-from icing_env.dynamics import air_data, forces, present_aircraft
+from icing_env.dynamics import air_data, denser, forces, present_aircraft
 from icing_env.frames import direction_cosines
 from icing_env.ice_protection import advance_protection
 from icing_env.integrate import AFTER, BEFORE, GUST_RECORDS, GUSTS, RECORDS, TRIAL, copy, copy_gusts, rk4
@@ -54,7 +54,7 @@ DUE = np.bool_(True)  # for a plain True numba would compile the instruments onc
 def advance_weather_and_ice(s: Any, p: Any, airspeed: float, dt: float) -> None:
     """The slow clock: cloud along the track and ice on every surface."""
     advance_cloud(s, p, airspeed, dt)
-    density = (p.density_factor + p.density_lapse*s.altitude)*pressure(s.altitude)/(GAS_CONSTANT*s.temperature)
+    density = denser(s.altitude, p)*pressure(s.altitude)/(GAS_CONSTANT*s.temperature)
     advance_accretion(s, p, airspeed, density, dt)
 
 
