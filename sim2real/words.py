@@ -72,8 +72,8 @@ def listed(names: Sequence[str]) -> str:
 
 
 def term_named(term: str) -> str:
-    """A term as tables have it; a free course of time is told by the root mean square of its heights."""
-    return "course of time, RMS" if term == COURSE else term
+    """A term as people read it; a free course of time is told by the root mean square of its heights."""
+    return {COURSE: "course of time, RMS", "height": "air density with height"}.get(term, term)
 
 
 def _another_aircraft(unknown: dict[str, Any], named: list[str], sure: str) -> str:
@@ -95,7 +95,7 @@ def _named(effect: dict[str, Any]) -> str:
     other = f", which these records cannot tell from {listed(told)}," if told else ""
     if servo := _servo(form):
         return f"{effect['name']} ({size}), which is a servo of second order ({servo}){other}"
-    terms = ", ".join(t["term"] for t in form["terms"] if t["term"] != "1") if form else ""
+    terms = ", ".join(term_named(t["term"]) for t in form["terms"] if t["term"] != "1") if form else ""
     bent = f" in another form than the library's ({form['component']} by {terms or 'a constant'})" if form else ""
     return f"{effect['name']} ({size}{_varying(effect)}){bent}{other}"
 

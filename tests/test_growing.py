@@ -24,6 +24,7 @@ from sim2real.posterior.sets import SetFit
 from sim2real.prediction.predictor import Predictor
 from sim2real.records.channels import MEASURED
 from sim2real.records.reconstruct import reconstruct
+from sim2real.words import term_named
 from testbed.withheld.flights import Aircraft
 
 
@@ -84,6 +85,7 @@ def test_generic_terms_that_grow_are_the_effect_on_the_air_that_makes_them():
     assert not home("air_density", gathers)
     assert grows(effects.get("air_density")) == bends(effects.get("air_density")) == {("wind", "height")}
     assert not grows(effects.get("wind_shear"))
+    assert "density" in term_named("height") and term_named("alpha") == "alpha"
 
 
 @pytest.mark.slow
